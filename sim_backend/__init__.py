@@ -1,0 +1,1 @@
+"""The slider model, the simulated world, and the emulators that speak the devices' real bytes."""

@@ -1,0 +1,1 @@
+"""The `push` program: composes drivers, loop, gate, recorder and emulators; start at `tools.launcher`."""
