@@ -8,8 +8,9 @@ raise. A driver stamps arrivals; it never judges staleness and never resumes mot
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from types import TracebackType
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Protocol, Self, TypeVar
 
 from robot_io.messages import DeviceHealth, DeviceInfo, Stamped
 
@@ -53,24 +54,24 @@ class CommandedDriver(Driver[SampleT_co], Protocol[SampleT_co, CommandT]):
         ...
 
 
-class DriverBase(Generic[SampleT_co]):
+class DriverBase(ABC):
     """`with driver:` opens and starts it, and always stops and closes it."""
 
+    @abstractmethod
     def open(self) -> DeviceInfo:
         """See `Driver.open`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def start(self) -> None:
         """See `Driver.start`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def stop(self) -> None:
         """See `Driver.stop`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def close(self) -> None:
         """See `Driver.close`."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         try:

@@ -1,0 +1,218 @@
+"""The rig file: TOML to typed, frozen settings with the unit in every key and the range in every type.
+
+`load_rig` reads a shipped name (`sim`, `emulated`, `thing`) or a path. Every table is checked, so that all
+mistakes of a file are reported at once; an unknown key names the nearest known one.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from robot_io.errors import ConfigError
+
+Positive = Annotated[float, Meta(gt=0)]
+NonNegative = Annotated[float, Meta(ge=0)]
+Level = Literal["sim", "emulated", "hardware"]
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+Matrix3 = tuple[Vector3, Vector3, Vector3]
+Vector6 = tuple[float, float, float, float, float, float]
+
+RIGS_DIR = Path(__file__).parent / "rigs"
+
+
+class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A table of a rig file: frozen, unknown keys refused."""
+
+
+class LoopConfig(Table):
+    """Rate of the control loop."""
+
+    rate_hz: Annotated[float, Meta(ge=20, le=500)] = 100.0
+
+
+class FtConfig(Table):
+    """The FT 300. `port`: a device path, a pty or `socket://host:port`; empty at levels sim and emulated."""
+
+    level: Level = "emulated"
+    port: str = ""
+    tare_seconds_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
+    noise_force_N: NonNegative = 1.2
+    """Noise of the sensor, one standard deviation of a force axis (FT 300 product sheet: 1.2 N)."""
+    noise_torque_Nm: NonNegative = 0.03
+
+
+class ArmConfig(Table):
+    """The UR10. `hold = "monitor"` sends nothing to the arm; `"servo"` holds it actively (see the safety page)."""
+
+    level: Level = "emulated"
+    host: str = ""
+    hold: Literal["monitor", "servo"] = "monitor"
+    held_pose_rad: Vector6 = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.3100)
+    held_pose_tolerance_rad: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
+    """How far the measured joints may be from `held_pose_rad` at start."""
+
+
+class TopicsConfig(Table):
+    """ROS topics and types of the base (rosbridge v2). An empty topic is not used."""
+
+    ros_version: Literal[1, 2] = 1
+    command: str = "/cmd_vel"
+    command_type: str = "geometry_msgs/Twist"
+    odometry: str = "/odometry/filtered"
+    odometry_type: str = "nav_msgs/Odometry"
+    base_pose: str = "/vicon/ThingBase_4/ThingBase_4"
+    base_pose_type: str = "geometry_msgs/TransformStamped"
+    status: str = "/mcu/status"
+    status_type: str = "ridgeback_msgs/Status"
+    slider_pose: str = ""
+    slider_pose_type: str = "geometry_msgs/TransformStamped"
+
+
+class BaseConfig(Table):
+    """The Ridgeback over rosbridge. `pose_source` says which topic localises the base."""
+
+    level: Level = "emulated"
+    url: str = ""
+    pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
+    pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
+    odometry_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 50.0
+    topics: TopicsConfig = TopicsConfig()
+
+
+class FramesConfig(Table):
+    """Constants of the rig, because the arm is held.
+
+    base_from_sensor: rotation, rows; its columns are the sensor's x, y, z axes in the BODY frame.
+    contact_in_base_m: centre of the contact ball in the BODY frame.
+    sensor_in_base_m: origin of the sensor frame in the BODY frame.
+    base_from_marker: x (m), y (m), yaw (rad) of the motion-capture marker frame in the BODY frame.
+    """
+
+    base_from_sensor: Matrix3
+    contact_in_base_m: Vector3
+    sensor_in_base_m: Vector3
+    base_from_marker: Vector3 = (0.0, 0.0, 0.0)
+
+
+class PathConfig(Table):
+    """The straight path in the WORLD frame: a point on it (where distance starts to be expected) and its direction."""
+
+    origin_m: Vector2 = (0.0, 0.0)
+    direction_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
+    expected_contact_m: Annotated[float, Meta(ge=0, le=2)] = 0.05
+    """Distance from where the approach starts to where the object is expected."""
+
+
+class ControlConfig(Table):
+    """Gains and speeds of the push."""
+
+    controller: Literal["force", "open-loop"] = "force"
+    k_f: Annotated[float, Meta(ge=0, le=2)] = 0.3
+    k_y_rad_per_m: Annotated[float, Meta(ge=0, le=2)] = 0.2
+    push_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.1
+    approach_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
+    ramp_s: Annotated[float, Meta(ge=0.1, le=10)] = 1.0
+    distance_m: Annotated[float, Meta(gt=0, le=1000)] = 2.0
+    force_filter_tau_s: Annotated[float, Meta(ge=0, le=2)] = 0.05
+    force_min_N: Annotated[float, Meta(gt=0, le=50)] = 5.0
+    contact_samples: Annotated[int, Meta(ge=1, le=100)] = 5
+    heading_gain_per_s: Annotated[float, Meta(ge=0, le=5)] = 1.0
+    max_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=0.25)] = 0.1
+    lost_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=1)] = 0.2
+    lost_time_s: Annotated[float, Meta(gt=0, le=10)] = 3.0
+    lost_distance_m: Annotated[float, Meta(gt=0, le=2)] = 0.3
+    lost_rest_s: Annotated[float, Meta(gt=0, le=60)] = 2.0
+
+
+class LimitsConfig(Table):
+    """Limits of this rig; the program's own ceilings (`safety/limits.py`) may only be lowered."""
+
+    max_force_N: Positive = 150.0
+    slow_force_N: Positive = 100.0
+    max_torque_Nm: Positive = 20.0
+    envelope_factor: Annotated[float, Meta(gt=1, le=3)] = 1.5
+    max_acceleration_m_per_s2: Annotated[float, Meta(gt=0, le=2.5)] = 1.0
+    max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
+    max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
+    tilt_hold_warn_rad: Positive = 0.005
+    tilt_hold_stop_rad: Positive = 0.01
+
+
+class SliderConfig(Table):
+    """The object in the simulated world. `width_m` is along the pushed face of a rectangle; a circle uses `radius_m`."""
+
+    shape: Literal["rectangle", "circle"] = "rectangle"
+    length_m: Positive = 0.40
+    width_m: Positive = 0.40
+    radius_m: Positive = 0.25
+    mass_kg: Positive = 5.1
+    floor_friction: Annotated[float, Meta(gt=0, le=2)] = 0.30
+    contact_friction: Annotated[float, Meta(ge=0, le=2)] = 0.30
+    pressure: Literal["uniform", "rim", "point"] = "uniform"
+    """`uniform` by the integral in the paper, `rim` at the greatest distance, `point` a tenth of uniform."""
+
+
+class StartConfig(Table):
+    """Where things stand in the simulated world before the approach, relative to the path."""
+
+    lateral_offset_m: float = 0.05
+    """Lateral offset of the contact ball from the path (left positive)."""
+    edge_offset_m: float = 0.03
+    """Where on the object's pushed face the ball will meet it, from the middle (left positive)."""
+    heading_deg: float = 3.0
+    """Heading of the object relative to the path."""
+    gap_m: NonNegative = 0.05
+    """Free distance between ball and object along the path; 0 with `--start-in-contact`."""
+    spread: Annotated[float, Meta(ge=0, le=1)] = 0.2
+    """How much each seed varies the three offsets above (0: not at all; 0.2: by up to 20 %)."""
+
+
+class SensorModelConfig(Table):
+    """How the simulated FT 300 errs: bias (N, N*m, sensor frame), tool weight and its centre, noise (1 sigma)."""
+
+    bias: Vector6 = (-20.68, 21.95, -48.70, -0.097, 1.172, -0.321)
+    tool_mass_kg: NonNegative = 0.6
+    tool_com_in_sensor_m: Vector3 = (0.0, 0.0, 0.06)
+    noise_force_N: NonNegative = 0.3
+    noise_torque_Nm: NonNegative = 0.005
+    rate_hz: Annotated[float, Meta(ge=20, le=120)] = 100.016
+    phase: Annotated[float, Meta(ge=0, lt=1)] = 0.37
+    latency_ms: Annotated[int, Meta(ge=0, le=16)] = 1
+    """Latency timer of the emulated USB adapter: 0, 1 or 16 ms."""
+
+
+class WorldConfig(Table):
+    """The simulated world, used at levels sim and emulated."""
+
+    solver: Literal["exact", "osqp"] = "exact"
+    slider: SliderConfig = SliderConfig()
+    start: StartConfig = StartConfig()
+    sensor: SensorModelConfig = SensorModelConfig()
+    arm_rate_hz: Annotated[float, Meta(ge=20, le=125.5)] = 124.99
+    arm_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.21
+    base_tick_rate_error: Annotated[float, Meta(ge=-0.01, le=0.01)] = 0.0001
+    base_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.53
+    mocap_rate_hz: Annotated[float, Meta(ge=5, le=200)] = 100.007
+
+
+class RigConfig(Table):
+    """One robot, real or not: its devices, frames, path, gains, limits and, where simulated, its world."""
+
+    name: str
+    frames: FramesConfig
+    description: str = ""
+    loop: LoopConfig = LoopConfig()
+    ft: FtConfig = FtConfig()
+    arm: ArmConfig = ArmConfig()
+    base: BaseConfig = BaseConfig()
+    path: PathConfig = PathConfig()
+    control: ControlConfig = ControlConfig()
+    limits: LimitsConfig = LimitsConfig()
+    world: WorldConfig = WorldConfig()
