@@ -38,6 +38,7 @@ class VirtualClock:
         self._now_ns = start_ns
 
     def __call__(self) -> int:
+        """Return the virtual time in ns."""
         return self._now_ns
 
     def advance_to(self, now_ns: int) -> None:

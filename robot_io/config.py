@@ -6,15 +6,11 @@ mistakes of a file are reported at once; an unknown key names the nearest known 
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
-
-from robot_io.errors import ConfigError
 
 Positive = Annotated[float, Meta(gt=0)]
 NonNegative = Annotated[float, Meta(ge=0)]
@@ -31,13 +27,13 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of a rig file: frozen, unknown keys refused."""
 
 
-class LoopConfig(Table):
+class LoopConfig(Table, frozen=True):
     """Rate of the control loop."""
 
     rate_hz: Annotated[float, Meta(ge=20, le=500)] = 100.0
 
 
-class FtConfig(Table):
+class FtConfig(Table, frozen=True):
     """The FT 300. `port`: a device path, a pty or `socket://host:port`; empty at levels sim and emulated."""
 
     level: Level = "emulated"
@@ -48,7 +44,7 @@ class FtConfig(Table):
     noise_torque_Nm: NonNegative = 0.03
 
 
-class ArmConfig(Table):
+class ArmConfig(Table, frozen=True):
     """The UR10. `hold = "monitor"` sends nothing to the arm; `"servo"` holds it actively (see the safety page)."""
 
     level: Level = "emulated"
@@ -59,7 +55,7 @@ class ArmConfig(Table):
     """How far the measured joints may be from `held_pose_rad` at start."""
 
 
-class TopicsConfig(Table):
+class TopicsConfig(Table, frozen=True):
     """ROS topics and types of the base (rosbridge v2). An empty topic is not used."""
 
     ros_version: Literal[1, 2] = 1
@@ -75,7 +71,7 @@ class TopicsConfig(Table):
     slider_pose_type: str = "geometry_msgs/TransformStamped"
 
 
-class BaseConfig(Table):
+class BaseConfig(Table, frozen=True):
     """The Ridgeback over rosbridge. `pose_source` says which topic localises the base."""
 
     level: Level = "emulated"
@@ -86,7 +82,7 @@ class BaseConfig(Table):
     topics: TopicsConfig = TopicsConfig()
 
 
-class FramesConfig(Table):
+class FramesConfig(Table, frozen=True):
     """Constants of the rig, because the arm is held.
 
     base_from_sensor: rotation, rows; its columns are the sensor's x, y, z axes in the BODY frame.
@@ -101,8 +97,8 @@ class FramesConfig(Table):
     base_from_marker: Vector3 = (0.0, 0.0, 0.0)
 
 
-class PathConfig(Table):
-    """The straight path in the WORLD frame: a point on it (where distance starts to be expected) and its direction."""
+class PathConfig(Table, frozen=True):
+    """The straight path in the WORLD frame: a point on it (from which distance is expected) and its direction."""
 
     origin_m: Vector2 = (0.0, 0.0)
     direction_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
@@ -110,7 +106,7 @@ class PathConfig(Table):
     """Distance from where the approach starts to where the object is expected."""
 
 
-class ControlConfig(Table):
+class ControlConfig(Table, frozen=True):
     """Gains and speeds of the push."""
 
     controller: Literal["force", "open-loop"] = "force"
@@ -131,7 +127,7 @@ class ControlConfig(Table):
     lost_rest_s: Annotated[float, Meta(gt=0, le=60)] = 2.0
 
 
-class LimitsConfig(Table):
+class LimitsConfig(Table, frozen=True):
     """Limits of this rig; the program's own ceilings (`safety/limits.py`) may only be lowered."""
 
     max_force_N: Positive = 150.0
@@ -145,7 +141,7 @@ class LimitsConfig(Table):
     tilt_hold_stop_rad: Positive = 0.01
 
 
-class SliderConfig(Table):
+class SliderConfig(Table, frozen=True):
     """The object in the simulated world. `width_m` is along the pushed face of a rectangle; a circle uses `radius_m`."""
 
     shape: Literal["rectangle", "circle"] = "rectangle"
@@ -159,7 +155,7 @@ class SliderConfig(Table):
     """`uniform` by the integral in the paper, `rim` at the greatest distance, `point` a tenth of uniform."""
 
 
-class StartConfig(Table):
+class StartConfig(Table, frozen=True):
     """Where things stand in the simulated world before the approach, relative to the path."""
 
     lateral_offset_m: float = 0.05
@@ -174,7 +170,7 @@ class StartConfig(Table):
     """How much each seed varies the three offsets above (0: not at all; 0.2: by up to 20 %)."""
 
 
-class SensorModelConfig(Table):
+class SensorModelConfig(Table, frozen=True):
     """How the simulated FT 300 errs: bias (N, N*m, sensor frame), tool weight and its centre, noise (1 sigma)."""
 
     bias: Vector6 = (-20.68, 21.95, -48.70, -0.097, 1.172, -0.321)
@@ -188,7 +184,7 @@ class SensorModelConfig(Table):
     """Latency timer of the emulated USB adapter: 0, 1 or 16 ms."""
 
 
-class WorldConfig(Table):
+class WorldConfig(Table, frozen=True):
     """The simulated world, used at levels sim and emulated."""
 
     solver: Literal["exact", "osqp"] = "exact"
@@ -202,7 +198,7 @@ class WorldConfig(Table):
     mocap_rate_hz: Annotated[float, Meta(ge=5, le=200)] = 100.007
 
 
-class RigConfig(Table):
+class RigConfig(Table, frozen=True):
     """One robot, real or not: its devices, frames, path, gains, limits and, where simulated, its world."""
 
     name: str

@@ -14,11 +14,11 @@ from typing import Protocol, Self, TypeVar
 
 from robot_io.messages import DeviceHealth, DeviceInfo, Stamped
 
-SampleT_co = TypeVar("SampleT_co", covariant=True)
+SampleT = TypeVar("SampleT")
 CommandT = TypeVar("CommandT")
 
 
-class Driver(Protocol[SampleT_co]):
+class Driver(Protocol[SampleT]):
     """A device that gives samples."""
 
     def open(self) -> DeviceInfo:
@@ -29,7 +29,7 @@ class Driver(Protocol[SampleT_co]):
         """Begin the flow of samples. Raises DeviceError when the device refuses."""
         ...
 
-    def drain(self) -> tuple[Stamped[SampleT_co], ...]:
+    def drain(self) -> tuple[Stamped[SampleT], ...]:
         """Return every new sample since the last call, oldest first. Never blocks, never raises on link loss."""
         ...
 
@@ -46,7 +46,7 @@ class Driver(Protocol[SampleT_co]):
         ...
 
 
-class CommandedDriver(Driver[SampleT_co], Protocol[SampleT_co, CommandT]):
+class CommandedDriver(Driver[SampleT], Protocol[SampleT, CommandT]):
     """A device that also takes commands."""
 
     def command(self, wanted: CommandT) -> CommandT:

@@ -51,7 +51,7 @@ class ConfigError(UsageError):
     """A rig file that cannot be used: unknown key, value out of range, missing calibration."""
 
 
-class EnvironmentFault(PushError):  # noqa: N818 - "EnvironmentError" is a builtin
+class EnvironmentFault(PushError):
     """This machine is in the way: a foreign package, a missing extra, a rig already in use."""
 
     exit_code = 3
@@ -75,25 +75,25 @@ class DeviceNotReady(DeviceError):
     """The device answers and cannot be used now: not running, stop engaged, reading not settled."""
 
 
-class SafetyStop(PushError):  # noqa: N818 - named for what it is to the user
+class SafetyStop(PushError):
     """The run was stopped by a safety check."""
 
     exit_code = 5
 
 
-class ContactLost(PushError):  # noqa: N818 - named for what it is to the user
+class ContactLost(PushError):
     """The object was lost on the way, or never met."""
 
     exit_code = 6
 
 
-class ReplayDiffers(PushError):  # noqa: N818 - named for what it is to the user
+class ReplayDiffers(PushError):
     """Replaying a log gave other outputs than it holds."""
 
     exit_code = 7
 
 
-class LogDamaged(PushError):  # noqa: N818 - named for what it is to the user
+class LogDamaged(PushError):
     """A log that is truncated, altered or not a log of this program."""
 
     exit_code = 8

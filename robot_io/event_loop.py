@@ -115,9 +115,7 @@ class EventLoop:
         """Call `callback(deadline_ns)` once, at or after the absolute time `deadline_ns`."""
         return self._push(Timer(deadline_ns, 0, callback))
 
-    def call_every(
-        self, period_ns: int, callback: Callable[[int], None], first_ns: int | None = None
-    ) -> Timer:
+    def call_every(self, period_ns: int, callback: Callable[[int], None], first_ns: int | None = None) -> Timer:
         """Call `callback(deadline_ns)` on an absolute grid.
 
         Late deadlines are called one after another (a device emulator owes each sample); a callback that
