@@ -1,16 +1,24 @@
 """The rig file: TOML to typed, frozen settings with the unit in every key and the range in every type.
 
-`load_rig` reads a shipped name (`sim`, `emulated`, `thing`) or a path. Every table is checked, so that all
-mistakes of a file are reported at once; an unknown key names the nearest known one.
+`load_rig` reads a shipped name (`sim`, `emulated`, `thing`, ...) or a path. All mistakes of a file are reported
+at once, each with its line; an unknown key names the nearest known one. A file may say `extends = "emulated"`
+and then holds only what differs.
 """
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
+
+from robot_io import toml_text
+from robot_io.errors import ConfigError
+from robot_io.table_check import build
+from robot_io.toml_text import Origins
 
 Positive = Annotated[float, Meta(gt=0)]
 NonNegative = Annotated[float, Meta(ge=0)]
@@ -137,12 +145,12 @@ class LimitsConfig(Table, frozen=True):
     max_acceleration_m_per_s2: Annotated[float, Meta(gt=0, le=2.5)] = 1.0
     max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
     max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
-    tilt_hold_warn_rad: Positive = 0.005
-    tilt_hold_stop_rad: Positive = 0.01
+    hold_slow_rad: Positive = 0.005
+    hold_stop_rad: Positive = 0.01
 
 
 class SliderConfig(Table, frozen=True):
-    """The object in the simulated world. `width_m` is along the pushed face of a rectangle; a circle uses `radius_m`."""
+    """The object in the simulated world. `width_m` is along a rectangle's pushed face; a circle uses `radius_m`."""
 
     shape: Literal["rectangle", "circle"] = "rectangle"
     length_m: Positive = 0.40
@@ -212,3 +220,69 @@ class RigConfig(Table, frozen=True):
     control: ControlConfig = ControlConfig()
     limits: LimitsConfig = LimitsConfig()
     world: WorldConfig = WorldConfig()
+
+
+def shipped_rigs() -> list[str]:
+    """Return the names of the rigs that come with the program."""
+    return sorted(path.stem for path in RIGS_DIR.glob("*.toml"))
+
+
+def load_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
+    """Load a shipped rig by name, or a file by path, with `key=value` settings laid over it.
+
+    A value of `overrides` is TOML (`control.k_f=0.1`, `path.direction_deg=-30`); what is not TOML is a string.
+    Raises ConfigError (no such rig, unknown key, value out of range, not finite) and UsageError (bad override).
+    """
+    path = _find(name_or_path)
+    data, origins = _read(path, ())
+    for setting in overrides:
+        key, value = toml_text.parse_setting(setting)
+        toml_text.put(data, key, value)
+        origins[key] = f"--set {'.'.join(key)}"
+    return build(RigConfig, data, origins, str(path))
+
+
+def rig_to_toml(rig: RigConfig) -> str:
+    """Write the whole resolved rig as TOML; `rig_from_toml` gives back an equal rig, every float bit for bit."""
+    return toml_text.emit(msgspec.to_builtins(rig))
+
+
+def rig_from_toml(text: str, name: str = "rig") -> RigConfig:
+    """Read what `rig_to_toml` wrote; ConfigError (with `name` as its place) when it is anything else."""
+    data, origins = toml_text.parse(text, name)
+    return build(RigConfig, data, origins, name)
+
+
+def _find(name_or_path: str | Path) -> Path:
+    text = str(name_or_path)
+    if text in (shipped := shipped_rigs()):
+        return RIGS_DIR / f"{text}.toml"
+    path = Path(text)
+    if path.is_file():
+        return path
+    if path.suffix == ".toml" or "/" in text:
+        raise ConfigError("there is no such rig file", where=text)
+    near = difflib.get_close_matches(text, shipped, n=1)
+    hint = f"Did you mean `{near[0]}`? " if near else ""
+    raise ConfigError(
+        f"there is no rig named `{text}`", do=f"{hint}Shipped rigs: {', '.join(shipped)}; or give the path of a file"
+    )
+
+
+def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
+    """Return the tables of `path` laid over those of the rig it extends, and where each key was written."""
+    if path.resolve() in seen:
+        raise ConfigError("this rig extends itself", where=str(path))
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"cannot read it: {error}", where=str(path)) from None
+    data, origins = toml_text.parse(text, str(path))
+    if "extends" not in data:
+        return data, origins
+    base = data.pop("extends")
+    if not isinstance(base, str):
+        raise ConfigError("`extends` names a rig: a shipped name or a path", where=origins.get(("extends",), str(path)))
+    beside = path.parent / base
+    below, below_origins = _read(beside if beside.is_file() else _find(base), (*seen, path.resolve()))
+    return toml_text.merge(below, data), below_origins | origins
