@@ -4,7 +4,7 @@ A message is a `msgspec.Struct`; its annotations say how each field goes on the 
 
     float -> float64          int, IntEnum -> int64      bool -> bool       str -> string     bytes -> uint8[]
     Annotated[int, "uint8"]   any other width            tuple[X, ...] -> X[]                 Struct -> nested
-    tuple[X, X, X] -> X[3]    (all of one type)
+    tuple[X, X, X] -> X[3]    (all of one type)  Annotated[tuple[X, ...], 36] -> X[36]
 
 A nested type is called `push_msgs/msg/<ClassName>` unless it has a class variable `__ros_name__`.
 """
@@ -84,6 +84,8 @@ def shape_of(annotation: Any) -> Shape:
         for note in notes:
             if isinstance(note, str):
                 shape = _with_width(shape, note, annotation)
+            elif isinstance(note, int) and isinstance(shape, Many):
+                shape = Many(shape.element, note)
         return shape
     if get_origin(annotation) is tuple:
         return _shape_of_tuple(annotation)
