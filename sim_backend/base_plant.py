@@ -1,0 +1,172 @@
+"""The Ridgeback's wheels, deterministic: what the wheel controller makes of the commands it hears.
+
+Two clocks on one time line, both fixed at the start: a 1 ms grid on which the pose is integrated, and the
+controller's own tick of 25 Hz (times one plus `rate_error`, shifted by `tick_phase` of a period), which acts at
+the first grid time that is not before it. At a tick the newest command that arrived by then is clamped to the
+speed limits, or taken for zero when it is older than 0.25 s, and approached with the acceleration limits, each
+axis by itself. Between ticks the wheels hold that velocity: the real ones follow it within a tick, and the
+contact does not care. The pose is integrated with the heading in the middle of each step.
+
+A tick acts when the plant leaves its grid time, so a command that arrives at exactly that time still counts,
+and the result does not depend on how the way there was split into calls.
+Figures: ridgeback_control (control.yaml, mecanum_drive_controller, melodic-devel).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from robot_io.clock import NS_PER_MS, NS_PER_S
+from robot_io.messages import BodyTwist, Pose2D
+
+GRID_NS = NS_PER_MS
+TICK_RATE_HZ = 25.0
+MAX_SPEED_M_PER_S = 1.1
+MAX_TURN_RATE_RAD_PER_S = 2.0
+MAX_SPEED_STEP_M_PER_S = 0.1
+"""2.5 m/s^2 over a tick of 40 ms."""
+MAX_TURN_RATE_STEP_RAD_PER_S = 0.04
+"""1.0 rad/s^2 over a tick of 40 ms."""
+COMMAND_TIMEOUT_NS = 250 * NS_PER_MS
+
+_GRID_S = GRID_NS / NS_PER_S
+
+
+def clamp(value: float, low: float, high: float) -> float:
+    """Clamp as the controller does, min(max(low, x), high): NaN becomes `low`, full speed backwards."""
+    raised = value if value > low else low
+    return high if high < raised else raised
+
+
+class BasePlant:
+    """A Ridgeback that rolls over the floor: commands in, pose and velocity out.
+
+    `start`: pose in the WORLD frame. `start_ns`: origin of both clocks. `tick_phase`: first tick after that part
+    of a period, in [0, 1). `rate_error`: relative error of the controller's clock (0.0001: 25.0025 Hz).
+    """
+
+    def __init__(self, start: Pose2D, start_ns: int, *, tick_phase: float = 0.0, rate_error: float = 0.0) -> None:
+        period_ns = NS_PER_S / (TICK_RATE_HZ * (1.0 + rate_error))
+        self._tick_period_ns = period_ns
+        self._tick_phase = tick_phase
+        self._start_ns = start_ns
+        self._tick = 0
+        self._tick_due_ns = self._grid_time_of_tick(0)
+        self._now_ns = start_ns
+        self._x, self._y, self._yaw = start.x, start.y, start.yaw
+        self._odom_x = self._odom_y = self._odom_yaw = 0.0
+        self._velocity = BodyTwist()
+        self._drivers_active = True
+        self._target = BodyTwist()
+        self._target_ns: int | None = None
+        self._commands: deque[tuple[int, BodyTwist]] = deque()
+        self._switches: deque[tuple[int, bool]] = deque()
+
+    @property
+    def now_ns(self) -> int:
+        """The grid time up to which the plant has been stepped."""
+        return self._now_ns
+
+    @property
+    def pose(self) -> Pose2D:
+        """Pose in the WORLD frame."""
+        return Pose2D(self._x, self._y, _wrapped(self._yaw))
+
+    @property
+    def velocity(self) -> BodyTwist:
+        """Velocity of the wheels in the BODY frame."""
+        return self._velocity
+
+    @property
+    def odometry(self) -> Pose2D:
+        """Pose as the wheels count it: same motion, its own origin at the start."""
+        return Pose2D(self._odom_x, self._odom_y, _wrapped(self._odom_yaw))
+
+    @property
+    def drivers_active(self) -> bool:
+        """Whether the motors are driven."""
+        return self._drivers_active
+
+    def command(self, twist: BodyTwist, arrival_ns: int) -> int:
+        """Hear a command (BODY frame, NaN as it comes); return the arrival time that counts.
+
+        It acts at the first tick that is not before its arrival. An arrival in the past counts as now, because
+        what has been passed through stays as it was; arrivals must not go back among themselves (ValueError).
+        """
+        arrival_ns = max(arrival_ns, self._now_ns)
+        if self._commands and arrival_ns < self._commands[-1][0]:
+            raise ValueError(f"command arrived before the one before it: {arrival_ns} < {self._commands[-1][0]}")
+        self._commands.append((arrival_ns, twist))
+        return arrival_ns
+
+    def set_drivers(self, active: bool, at_ns: int) -> int:
+        """Switch the motors at the first tick not before `at_ns`; return the time that counts.
+
+        Without drivers the wheels are held: they stand from that tick on. Driven again, they start from rest.
+        """
+        at_ns = max(at_ns, self._now_ns)
+        if self._switches and at_ns < self._switches[-1][0]:
+            raise ValueError(f"drivers switched before the time of the switch before: {at_ns}")
+        self._switches.append((at_ns, active))
+        return at_ns
+
+    def step_to(self, t_ns: int) -> None:
+        """Step to the last grid time that is not after `t_ns`; the past is left as it is."""
+        while self._now_ns + GRID_NS <= t_ns:
+            if self._now_ns >= self._tick_due_ns:
+                self._control_tick()
+            self._integrate()
+            self._now_ns += GRID_NS
+
+    def _grid_time_of_tick(self, tick: int) -> int:
+        return self._start_ns + GRID_NS * math.ceil((tick + self._tick_phase) * self._tick_period_ns / GRID_NS)
+
+    def _control_tick(self) -> None:
+        tick_ns = self._tick_due_ns
+        self._tick += 1
+        self._tick_due_ns = self._grid_time_of_tick(self._tick)
+        while self._commands and self._commands[0][0] <= tick_ns:
+            self._target_ns, self._target = self._commands.popleft()
+        while self._switches and self._switches[0][0] <= tick_ns:
+            self._drivers_active = self._switches.popleft()[1]
+        if not self._drivers_active:
+            self._velocity = BodyTwist()
+            return
+        fresh = self._target_ns is not None and tick_ns - self._target_ns <= COMMAND_TIMEOUT_NS
+        target = self._target if fresh else BodyTwist()
+        before = self._velocity
+        self._velocity = BodyTwist(
+            _approach(target.vx, before.vx, MAX_SPEED_M_PER_S, MAX_SPEED_STEP_M_PER_S),
+            _approach(target.vy, before.vy, MAX_SPEED_M_PER_S, MAX_SPEED_STEP_M_PER_S),
+            _approach(target.omega, before.omega, MAX_TURN_RATE_RAD_PER_S, MAX_TURN_RATE_STEP_RAD_PER_S),
+        )
+
+    def _integrate(self) -> None:
+        v = self._velocity
+        if v.vx == 0.0 and v.vy == 0.0 and v.omega == 0.0:
+            return
+        turn = v.omega * _GRID_S
+        cosine, sine = math.cos(self._yaw + 0.5 * turn), math.sin(self._yaw + 0.5 * turn)
+        self._x += (v.vx * cosine - v.vy * sine) * _GRID_S
+        self._y += (v.vx * sine + v.vy * cosine) * _GRID_S
+        self._yaw += turn
+        cosine, sine = math.cos(self._odom_yaw + 0.5 * turn), math.sin(self._odom_yaw + 0.5 * turn)
+        self._odom_x += (v.vx * cosine - v.vy * sine) * _GRID_S
+        self._odom_y += (v.vx * sine + v.vy * cosine) * _GRID_S
+        self._odom_yaw += turn
+
+
+def _approach(target: float, before: float, limit: float, step: float) -> float:
+    """Move from `before` towards the clamped target by at most `step`."""
+    wanted = clamp(target, -limit, limit)
+    change = wanted - before
+    if -step <= change <= step:
+        return wanted  # not before + change, which would miss the target by a rounding
+    return before + clamp(change, -step, step)
+
+
+def _wrapped(angle: float) -> float:
+    """Return the angle in (-pi, pi]."""
+    turned = math.remainder(angle, math.tau)
+    return turned if turned > -math.pi else math.pi
