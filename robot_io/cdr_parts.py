@@ -1,0 +1,323 @@
+"""How the fields of a Struct are written as CDR and read back; used through `cdr.CdrType`.
+
+Neighbouring numbers, also across nested Structs, form a run that is packed by one `struct.Struct` call, with one
+format for each of the eight offsets at which the run may start. Fields of variable length are parts of their own.
+Reading accepts only what writing would produce, padding included, and makes nothing larger than the payload.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from operator import attrgetter
+from typing import Any
+
+from robot_io.cdr_shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text
+
+HEADER_BYTES = 4
+"""Alignment counts from behind these bytes of encapsulation header."""
+
+_COUNT = struct.Struct("<I")
+
+
+class NotThisType(Exception):
+    """The bytes are not a message of the wanted type."""
+
+
+class Layout:
+    """A Struct as a row of parts that are written and read one after another."""
+
+    def __init__(self, shape: Nested) -> None:
+        self._parts: list[_Part] = []
+        run: list[tuple[str, Scalar, int | None]] = []
+        self.min_bytes = 0
+        for path, leaf in _leaves(shape, ""):
+            match leaf:
+                case Scalar():
+                    run.append((path, leaf, None))
+                case Many(Scalar() as element, int() as count):
+                    run.append((path, element, count))
+                case _:
+                    if run:
+                        self._parts.append(_Run(run))
+                        run = []
+                    self._parts.append(_variable_part(path, leaf))
+        if run:
+            self._parts.append(_Run(run))
+        self.min_bytes = sum(part.min_bytes for part in self._parts)
+        self._build = _builder(shape)
+
+    def write(self, value: Any, out: bytearray) -> None:
+        """Append `value` to `out`, which starts with the encapsulation header."""
+        for part in self._parts:
+            part.write(value, out)
+
+    def read(self, payload: bytes, at: int) -> tuple[Any, int]:
+        """Return the Struct found at `at` and where it ends. Raises NotThisType, struct.error or ValueError."""
+        leaves: list[Any] = []
+        for part in self._parts:
+            at = part.read(payload, at, leaves)
+        return self._build(iter(leaves)), at
+
+
+class _Part:
+    """Some neighbouring fields of a message; `min_bytes` is the least they can take."""
+
+    min_bytes: int
+
+    def write(self, owner: Any, out: bytearray) -> None:
+        """Append the fields of `owner` to `out`."""
+        raise NotImplementedError
+
+    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+        """Append the fields found at `at` to `leaves`; return where they end."""
+        raise NotImplementedError
+
+
+class _Run(_Part):
+    """Numbers and fixed arrays of numbers, packed in one call."""
+
+    def __init__(self, items: list[tuple[str, Scalar, int | None]]) -> None:
+        self._counts = [count for _, _, count in items]
+        self._flat = all(count is None for count in self._counts)
+        self._get = attrgetter(*(path for path, _, _ in items))
+        self._single = len(items) == 1
+        self._enums = [scalar.enum for _, scalar, _ in items]
+        self._plain = self._flat and not any(self._enums)
+        self._packers = [struct.Struct(_format(items, start)) for start in range(8)]
+        # Only these bytes can differ from what would be written again: padding, and bools.
+        self._loose = [
+            "x" in packer.format or any(scalar.ros == "bool" for _, scalar, _ in items) for packer in self._packers
+        ]
+        self.min_bytes = sum(PRIMITIVES[scalar.ros][1] * (count or 1) for _, scalar, count in items)
+
+    def write(self, owner: Any, out: bytearray) -> None:
+        values: Iterable[Any] = (self._get(owner),) if self._single else self._get(owner)
+        if not self._flat:
+            flat: list[Any] = []
+            for value, count in zip(values, self._counts, strict=True):
+                if count is None:
+                    flat.append(value)
+                elif len(value) == count:
+                    flat.extend(value)
+                else:
+                    raise ValueError(f"an array of {len(value)} where {count} belong")
+            values = flat
+        out += self._packers[(len(out) - HEADER_BYTES) & 7].pack(*values)
+
+    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+        offset = (at - HEADER_BYTES) & 7
+        packer = self._packers[offset]
+        if at + packer.size > len(payload):
+            raise NotThisType("it ends too soon")
+        values = packer.unpack_from(payload, at)
+        end = at + packer.size
+        if self._loose[offset] and packer.pack(*values) != payload[at:end]:
+            raise NotThisType("a bool that is neither 0 nor 1, or padding that is not zero")
+        if self._plain:
+            leaves.extend(values)
+            return end
+        i = 0
+        for count, enum in zip(self._counts, self._enums, strict=True):
+            taken = values[i : i + (count or 1)]
+            i += count or 1
+            if enum is not None:
+                taken = tuple(enum(value) for value in taken)
+            leaves.append(taken[0] if count is None else taken)
+        return end
+
+
+class _Text(_Part):
+    """A string."""
+
+    min_bytes = 5
+
+    def __init__(self, path: str) -> None:
+        self._get = attrgetter(path)
+
+    def write(self, owner: Any, out: bytearray) -> None:
+        _write_text(self._get(owner), out)
+
+    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+        text, at = _read_text(payload, at)
+        leaves.append(text)
+        return at
+
+
+class _Blob(_Part):
+    """Raw bytes."""
+
+    min_bytes = 4
+
+    def __init__(self, path: str) -> None:
+        self._get = attrgetter(path)
+
+    def write(self, owner: Any, out: bytearray) -> None:
+        value = self._get(owner)
+        _write_count(len(value), out)
+        out += value
+
+    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+        count, at = _read_count(payload, at, 1)
+        leaves.append(bytes(payload[at : at + count]))
+        return at + count
+
+
+class _Numbers(_Part):
+    """A sequence of numbers."""
+
+    min_bytes = 4
+
+    def __init__(self, path: str, scalar: Scalar) -> None:
+        self._get = attrgetter(path)
+        self._code, self._size = PRIMITIVES[scalar.ros]
+        self._enum = scalar.enum
+
+    def write(self, owner: Any, out: bytearray) -> None:
+        values = self._get(owner)
+        _write_count(len(values), out)
+        if values:
+            _pad(out, self._size)
+            out += struct.pack(f"<{len(values)}{self._code}", *values)
+
+    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+        count, at = _read_count(payload, at, self._size)
+        values: tuple[Any, ...] = ()
+        if count:
+            at = _aligned(payload, at, self._size)
+            form = f"<{count}{self._code}"
+            values = struct.unpack_from(form, payload, at)
+            if self._code == "?" and struct.pack(form, *values) != payload[at : at + count]:
+                raise NotThisType("a bool that is neither 0 nor 1")
+            at += count * self._size
+        if self._enum is not None:
+            enum = self._enum
+            values = tuple(enum(value) for value in values)
+        leaves.append(values)
+        return at
+
+
+class _Items(_Part):
+    """A sequence, or a fixed array, of Structs or strings."""
+
+    def __init__(self, path: str, element: Nested | Text, count: int | None) -> None:
+        self._get = attrgetter(path)
+        self._count = count
+        if isinstance(element, Nested):
+            layout = Layout(element)
+            self._write: Callable[[Any, bytearray], None] = layout.write
+            self._read: Callable[[bytes, int], tuple[Any, int]] = layout.read
+            self._element_min = layout.min_bytes
+        else:
+            self._write = _write_text
+            self._read = _read_text
+            self._element_min = _Text.min_bytes
+        self.min_bytes = 4 if count is None else count * self._element_min
+
+    def write(self, owner: Any, out: bytearray) -> None:
+        values = self._get(owner)
+        if self._count is None:
+            _write_count(len(values), out)
+        elif len(values) != self._count:
+            raise ValueError(f"an array of {len(values)} where {self._count} belong")
+        for value in values:
+            self._write(value, out)
+
+    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+        if self._count is None:
+            count, at = _read_count(payload, at, self._element_min)
+        else:
+            count = self._count
+        values = []
+        for _ in range(count):
+            value, at = self._read(payload, at)
+            values.append(value)
+        leaves.append(tuple(values))
+        return at
+
+
+def _variable_part(path: str, leaf: Shape) -> _Part:
+    match leaf:
+        case Text():
+            return _Text(path)
+        case Blob():
+            return _Blob(path)
+        case Many(Scalar() as element, None):
+            return _Numbers(path, element)
+        case Many((Nested() | Text()) as element, count):
+            return _Items(path, element, count)
+    raise TypeError(f"{path}: {leaf!r} has no CDR form")
+
+
+def _leaves(shape: Nested, prefix: str) -> Iterator[tuple[str, Shape]]:
+    for name, field in shape.fields:
+        if isinstance(field, Nested):
+            yield from _leaves(field, f"{prefix}{name}.")
+        else:
+            yield prefix + name, field
+
+
+def _builder(shape: Nested) -> Callable[[Iterator[Any]], Any]:
+    """Return the function that makes the Struct from its leaves, in wire order."""
+    struct_type = shape.struct_type
+    makers = [_builder(field) if isinstance(field, Nested) else next for _, field in shape.fields]
+    names = [name for name, _ in shape.fields]
+    if tuple(names) != tuple(_positional(struct_type)):
+        raise TypeError(f"{shape.ros_name}: fields must be positional, in order")
+    return lambda leaves: struct_type(*[make(leaves) for make in makers])
+
+
+def _positional(struct_type: Any) -> tuple[str, ...]:
+    origin = getattr(struct_type, "__origin__", struct_type)
+    fields: tuple[str, ...] = origin.__struct_fields__
+    return fields
+
+
+def _format(items: list[tuple[str, Scalar, int | None]], start: int) -> str:
+    form, at = "<", start
+    for _, scalar, count in items:
+        code, size = PRIMITIVES[scalar.ros]
+        gap = -at % size
+        form += f"{gap}x" if gap else ""
+        form += code if count is None else f"{count}{code}"
+        at += gap + size * (count or 1)
+    return form
+
+
+def _pad(out: bytearray, size: int) -> None:
+    out += bytes(-(len(out) - HEADER_BYTES) % size)
+
+
+def _aligned(payload: bytes, at: int, size: int) -> int:
+    end = at + (-(at - HEADER_BYTES) % size)
+    if any(payload[at:end]):
+        raise NotThisType("padding that is not zero")
+    return end
+
+
+def _write_count(count: int, out: bytearray) -> None:
+    _pad(out, 4)
+    out += _COUNT.pack(count)
+
+
+def _read_count(payload: bytes, at: int, element_bytes: int) -> tuple[int, int]:
+    at = _aligned(payload, at, 4)
+    (count,) = _COUNT.unpack_from(payload, at)
+    at += 4
+    if count * element_bytes > len(payload) - at:  # before anything of that size is made
+        raise NotThisType(f"{count} elements cannot fit")
+    return int(count), at
+
+
+def _write_text(text: str, out: bytearray) -> None:
+    raw = text.encode()
+    _write_count(len(raw) + 1, out)
+    out += raw + b"\x00"
+
+
+def _read_text(payload: bytes, at: int) -> tuple[str, int]:
+    size, at = _read_count(payload, at, 1)
+    end = at + size
+    if size == 0 or payload[end - 1] != 0:
+        raise NotThisType("a string without its end")
+    return payload[at : end - 1].decode(), end
