@@ -11,7 +11,8 @@
     |-- SafetyStop        5   the run was stopped by a safety check
     |-- ContactLost       6   the object was lost, or never met
     |-- ReplayDiffers     7   a log folds to other bytes than it holds
-    `-- LogDamaged        8   a log that cannot be trusted or read
+    |-- LogDamaged        8   a log that cannot be trusted or read
+    `-- OperatorStop    130   stopped by the operator, after a clean brake
 
 The number is the exit code of the `push` program. Each message says what happened, where, and what to do.
 """
@@ -97,3 +98,9 @@ class LogDamaged(PushError):
     """A log that is truncated, altered or not a log of this program."""
 
     exit_code = 8
+
+
+class OperatorStop(PushError):
+    """Stopped by the operator (a key, SIGINT or SIGTERM), after a clean brake."""
+
+    exit_code = 130

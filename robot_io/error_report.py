@@ -1,0 +1,48 @@
+"""How the program tells a person, or with `--json` a script, what went wrong."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import traceback
+
+from robot_io.errors import PushError
+
+SCHEMA = 1
+
+
+def tell(text: str) -> None:
+    """Print one line of people's text on stderr, if there is one."""
+    if sys.stderr is not None:  # print(file=None) would go to stdout
+        print(text, file=sys.stderr, flush=True)
+
+
+def say_json(value: object) -> None:
+    """Print `value` as one line of JSON on stdout, flushed; ValueError for a number that is not finite."""
+    if sys.stdout is not None:
+        print(json.dumps(value, allow_nan=False), flush=True)
+
+
+def report(error: PushError, *, as_json: bool) -> int:
+    """Tell about `error` in one sentence, with `--json` also as the last line of stdout; return the exit code."""
+    tell(f"push: {error}")
+    if as_json:
+        say_json({"schema": SCHEMA, "error": error.as_json()})
+    return error.exit_code
+
+
+def unexpected(error: BaseException) -> PushError:
+    """Turn a defect of the program into a sentence that says where its traceback was written."""
+    trace = "".join(traceback.format_exception(error))
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="push-error-", suffix=".txt", delete=False, encoding="utf-8", errors="replace"
+        ) as file:
+            file.write(trace)
+            place = file.name
+    except OSError:
+        tell(trace)
+        place = "the lines above"
+    summary = " ".join(f"{type(error).__name__}: {error}".split())
+    return PushError(f"unexpected {summary}", do=f"This is a defect of the program; its traceback is in {place}")

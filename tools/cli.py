@@ -1,0 +1,183 @@
+"""The `push` program: finds the command's module, imports only that one, and turns every error into one sentence.
+
+A command module has `add_arguments(parser)` and `run(args) -> int`. Commands of two words (`bench physics`) are
+entries with a space. `--json` promises exactly one object, on one line, last on stdout, errors included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.util
+import os
+import select
+import sys
+from collections.abc import Sequence
+from typing import NamedTuple, NoReturn
+
+from robot_io.error_report import report, unexpected
+from robot_io.errors import OperatorStop, PushError, UsageError
+
+BROKEN_PIPE = 141
+"""128 + SIGPIPE: whoever read our output has gone (`push log cat LOG | head`)."""
+
+
+class Command(NamedTuple):
+    """Where a command lives, what it does in a few words, and two examples of it."""
+
+    module: str
+    summary: str
+    examples: tuple[str, str]
+
+
+COMMANDS = {
+    "run": Command(
+        "tools.run_command",
+        "one push, on hardware, emulated or simulated",
+        ("push run emulated --distance-m 2", "push run sim --fast --seed 3 --json"),
+    ),
+    "replay": Command(
+        "tools.replay_command",
+        "fold a log again and compare every bit",
+        ("push replay runs/demo/run.mcap", "push replay runs/demo/run.mcap --json"),
+    ),
+    "report": Command(
+        "tools.report_command",
+        "figures and one self-contained page of a log",
+        ("push report runs/demo/run.mcap", "push report runs/demo/run.mcap --json"),
+    ),
+    "log": Command(
+        "tools.log_command",
+        "look into, export or recover a log",
+        ("push log info runs/demo/run.mcap", "push log recover runs/demo/run.mcap"),
+    ),
+    "sweep": Command(
+        "tools.sweep",
+        "many simulated pushes, and the paper's figures",
+        ("push sweep --quick", "push sweep --json"),
+    ),
+    "tune": Command("tools.tune", "map of the gains over simulated pushes", ("push tune", "push tune --json")),
+    "doctor": Command(
+        "tools.doctor_command",
+        "probe each device, read-only, and name the fix",
+        ("push doctor emulated", "push doctor thing --json"),
+    ),
+    "emulate": Command(
+        "tools.emulate_command",
+        "the wire emulators alone, until stopped",
+        ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate all --json"),
+    ),
+    "config": Command(
+        "tools.config_command",
+        "show or check a rig with all its values",
+        ("push config show emulated --set control.k_f=0.1", "push config check my-rig.toml"),
+    ),
+    "bench physics": Command(
+        "tools.bench_physics",
+        "measure the slider's solvers",
+        ("push bench physics", "push bench physics --json"),
+    ),
+}
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse that raises instead of exiting, so that `--json` holds for usage errors too."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise UsageError with argparse's own words."""
+        raise UsageError(message, where="command line", do=f"`{self.prog} --help` shows how")
+
+
+def available() -> dict[str, Command]:
+    """Return the commands of this build."""
+    return {name: command for name, command in COMMANDS.items() if importlib.util.find_spec(command.module)}
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run one command and return its exit code; never raises but for SystemExit of `--help`."""
+    keep_standard_descriptors()
+    as_json = "--json" in argv
+    try:
+        code = dispatch(argv)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except PushError as error:
+        return report(error, as_json=as_json)
+    except KeyboardInterrupt:
+        return report(OperatorStop("stopped by the operator"), as_json=as_json)
+    except Exception as error:
+        if isinstance(error, BrokenPipeError) and _reader_of_stdout_is_gone():
+            # Python flushes stdout once more at exit; give that flush somewhere to go.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            return BROKEN_PIPE
+        return report(unexpected(error), as_json=as_json)
+    return code
+
+
+def dispatch(argv: Sequence[str]) -> int:
+    """Find the command in `argv`, import its module and run it."""
+    name = " ".join(argv[:2]) if " ".join(argv[:2]) in COMMANDS else " ".join(argv[:1])
+    if name not in COMMANDS:
+        return _overview(argv)
+    command = available().get(name)
+    if command is None:
+        raise UsageError(f"`push {name}` is not part of this build", do="`push --help` lists the commands")
+    module = importlib.import_module(command.module)
+    parser = Parser(
+        prog=f"push {name}",
+        description=f"{command.summary[0].upper()}{command.summary[1:]}.",
+        epilog="examples:\n" + "\n".join(f"  {example}" for example in command.examples),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    module.add_arguments(parser)
+    args = parser.parse_args(list(argv[len(name.split()) :]))
+    return int(module.run(args))
+
+
+def _overview(argv: Sequence[str]) -> int:
+    """Answer `push`, `push --help`, `push --version`, a first word of two, and words that are no command."""
+    commands = available()
+    first = argv[0] if argv else "--help"
+    group = {name: command for name, command in commands.items() if name.startswith(f"{first} ")}
+    if first == "--version":
+        from importlib.metadata import version
+
+        print(f"push {version('single-point-push')}")
+        return 0
+    if first in ("-h", "--help", "help") or (group and set(argv[1:]) <= {"-h", "--help"}):
+        shown = group or commands
+        width = max(len(name) for name in shown)
+        lines = [f"  {name.ljust(width)}  {command.summary}" for name, command in shown.items()]
+        example = next(iter(shown.values())).examples[0]
+        print("usage: push COMMAND ...\n\ncommands:\n" + "\n".join(lines))
+        print(f"\nexamples:\n  {example}\n  push {next(iter(shown))} --help")
+        return 0
+    if first.startswith("-"):
+        raise UsageError(f"`{first}` is not an option of push", do="A command comes first: `push --help` lists them")
+    if group:
+        raise UsageError(f"`push {first}` needs one of: {', '.join(name.split()[1] for name in group)}")
+    import difflib
+
+    near = difflib.get_close_matches(first, [name.split()[0] for name in commands], n=1)
+    hint = f"Did you mean `push {near[0]}`?" if near else "`push --help` lists the commands"
+    raise UsageError(f"there is no command `{first}`", do=hint)
+
+
+def keep_standard_descriptors() -> None:
+    """Open /dev/null for each of the descriptors 0, 1, 2 that is closed.
+
+    Otherwise the next device opened would get the number, and a library that writes to descriptor 2
+    (ur_rtde does) would write into the device.
+    """
+    for fd in (0, 1, 2):
+        try:
+            os.fstat(fd)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is fd
+
+
+def _reader_of_stdout_is_gone() -> bool:
+    poll = select.poll()
+    poll.register(1, 0)
+    return any(events & select.POLLERR for _, events in poll.poll(0))
