@@ -1,0 +1,69 @@
+"""A point pusher at a polygon's corner: it clears the corner, goes on along one of the two faces, or sticks there."""
+
+from __future__ import annotations
+
+from math import hypot
+
+from sim_backend.contact_geometry import FaceRow
+from sim_backend.slider_exact import TINY, ContactSolution, ContactSolver, Moving, Sliding
+
+CornerChoice = tuple[ContactSolution, float, float, int]
+"""The motion, the inward normal x, y (BODY) it was found for, and the face it goes on along (-1: the corner)."""
+
+
+def solve_at_corner(
+    rows: tuple[FaceRow, ...],
+    corner: int,
+    solve: ContactSolver,
+    vx: float,
+    vy: float,
+    arguments: tuple[float, float, float, float, float],
+) -> CornerChoice | None:
+    """Return how a slider answers a point pusher at corner `corner` (m/s, BODY), or None if the pusher clears it.
+
+    Corner i is the high end of face i and the low end of the face before it. `arguments`: contact minus centre of
+    friction x, y, d_m, f_max_N, contact friction.
+    """
+    before = (corner - 1) % len(rows)
+    if min(_closing(rows[corner], vx, vy), _closing(rows[before], vx, vy)) <= 0.0:
+        return None  # outside one face's line is outside the slider
+    cx, cy, d, f_max, mu = arguments
+    on = {face: solve(cx, cy, rows[face][0], rows[face][1], vx, vy, d, f_max, mu) for face in (corner, before)}
+    for face, inward in ((corner, Sliding.RIGHT), (before, Sliding.LEFT)):
+        solution = on[face]
+        if isinstance(solution, Moving) and solution.mode in (Sliding.STICKING, inward):
+            return (solution, rows[face][0], rows[face][1], face)
+    return _stick(rows[corner], rows[before], vx, vy, arguments)
+
+
+def _closing(row: FaceRow, vx: float, vy: float) -> float:
+    return row[0] * vx + row[1] * vy
+
+
+def _stick(
+    one: FaceRow, other: FaceRow, vx: float, vy: float, arguments: tuple[float, float, float, float, float]
+) -> CornerChoice | None:
+    """Stick at the corner itself if some normal between the two faces' holds the force in its friction cone."""
+    cx, cy, d, f_max, mu = arguments
+    turn_rate = (cx * vy - cy * vx) / (d * d + cx * cx + cy * cy)
+    hx, hy = vx + turn_rate * cy, vy - turn_rate * cx
+    size = hypot(hx, hy, d * turn_rate)
+    if size < TINY:
+        return None
+    nx, ny = _nearest_normal(hx, hy, one, other)
+    if abs(nx * hy - ny * hx) > mu * (nx * hx + ny * hy) * (1 + 1e-12):
+        return None
+    scale = f_max / size
+    return (Moving(Sliding.STICKING, hx, hy, turn_rate, 0.0, hx * scale, hy * scale), nx, ny, -1)
+
+
+def _nearest_normal(hx: float, hy: float, one: FaceRow, other: FaceRow) -> tuple[float, float]:
+    """Return the direction between two normals (less than half a turn apart) that is nearest to (hx, hy)."""
+    sense = one[0] * other[1] - one[1] * other[0]
+    after_one = (one[0] * hy - one[1] * hx) * sense >= 0.0
+    before_other = (hx * other[1] - hy * other[0]) * sense >= 0.0
+    if after_one and before_other:
+        length = hypot(hx, hy)
+        return (hx / length, hy / length)
+    nearer = max((one, other), key=lambda row: row[0] * hx + row[1] * hy)
+    return (nearer[0], nearer[1])
