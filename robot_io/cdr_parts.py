@@ -8,11 +8,11 @@ Reading accepts only what writing would produce, padding included, and makes not
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from operator import attrgetter
 from typing import Any
 
-from robot_io.cdr_shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text
+from robot_io.cdr_shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text, builder, leaves
 
 HEADER_BYTES = 4
 """Alignment counts from behind these bytes of encapsulation header."""
@@ -31,7 +31,7 @@ class Layout:
         self._parts: list[_Part] = []
         run: list[tuple[str, Scalar, int | None]] = []
         self.min_bytes = 0
-        for path, leaf in _leaves(shape, ""):
+        for path, leaf in leaves(shape):
             match leaf:
                 case Scalar():
                     run.append((path, leaf, None))
@@ -45,7 +45,7 @@ class Layout:
         if run:
             self._parts.append(_Run(run))
         self.min_bytes = sum(part.min_bytes for part in self._parts)
-        self._build = _builder(shape)
+        self._build = builder(shape)
 
     def write(self, value: Any, out: bytearray) -> None:
         """Append `value` to `out`, which starts with the encapsulation header."""
@@ -54,10 +54,10 @@ class Layout:
 
     def read(self, payload: bytes, at: int) -> tuple[Any, int]:
         """Return the Struct found at `at` and where it ends. Raises NotThisType, struct.error or ValueError."""
-        leaves: list[Any] = []
+        found: list[Any] = []
         for part in self._parts:
-            at = part.read(payload, at, leaves)
-        return self._build(iter(leaves)), at
+            at = part.read(payload, at, found)
+        return self._build(iter(found)), at
 
 
 class _Part:
@@ -69,8 +69,8 @@ class _Part:
         """Append the fields of `owner` to `out`."""
         raise NotImplementedError
 
-    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
-        """Append the fields found at `at` to `leaves`; return where they end."""
+    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
+        """Append the fields found at `at` to `found`; return where they end."""
         raise NotImplementedError
 
 
@@ -105,7 +105,7 @@ class _Run(_Part):
             values = flat
         out += self._packers[(len(out) - HEADER_BYTES) & 7].pack(*values)
 
-    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         offset = (at - HEADER_BYTES) & 7
         packer = self._packers[offset]
         if at + packer.size > len(payload):
@@ -115,7 +115,7 @@ class _Run(_Part):
         if self._loose[offset] and packer.pack(*values) != payload[at:end]:
             raise NotThisType("a bool that is neither 0 nor 1, or padding that is not zero")
         if self._plain:
-            leaves.extend(values)
+            found.extend(values)
             return end
         i = 0
         for count, enum in zip(self._counts, self._enums, strict=True):
@@ -123,7 +123,7 @@ class _Run(_Part):
             i += count or 1
             if enum is not None:
                 taken = tuple(enum(value) for value in taken)
-            leaves.append(taken[0] if count is None else taken)
+            found.append(taken[0] if count is None else taken)
         return end
 
 
@@ -138,9 +138,9 @@ class _Text(_Part):
     def write(self, owner: Any, out: bytearray) -> None:
         _write_text(self._get(owner), out)
 
-    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         text, at = _read_text(payload, at)
-        leaves.append(text)
+        found.append(text)
         return at
 
 
@@ -157,9 +157,9 @@ class _Blob(_Part):
         _write_count(len(value), out)
         out += value
 
-    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         count, at = _read_count(payload, at, 1)
-        leaves.append(bytes(payload[at : at + count]))
+        found.append(bytes(payload[at : at + count]))
         return at + count
 
 
@@ -180,7 +180,7 @@ class _Numbers(_Part):
             _pad(out, self._size)
             out += struct.pack(f"<{len(values)}{self._code}", *values)
 
-    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         count, at = _read_count(payload, at, self._size)
         values: tuple[Any, ...] = ()
         if count:
@@ -193,7 +193,7 @@ class _Numbers(_Part):
         if self._enum is not None:
             enum = self._enum
             values = tuple(enum(value) for value in values)
-        leaves.append(values)
+        found.append(values)
         return at
 
 
@@ -223,7 +223,7 @@ class _Items(_Part):
         for value in values:
             self._write(value, out)
 
-    def read(self, payload: bytes, at: int, leaves: list[Any]) -> int:
+    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         if self._count is None:
             count, at = _read_count(payload, at, self._element_min)
         else:
@@ -232,7 +232,7 @@ class _Items(_Part):
         for _ in range(count):
             value, at = self._read(payload, at)
             values.append(value)
-        leaves.append(tuple(values))
+        found.append(tuple(values))
         return at
 
 
@@ -247,30 +247,6 @@ def _variable_part(path: str, leaf: Shape) -> _Part:
         case Many((Nested() | Text()) as element, count):
             return _Items(path, element, count)
     raise TypeError(f"{path}: {leaf!r} has no CDR form")
-
-
-def _leaves(shape: Nested, prefix: str) -> Iterator[tuple[str, Shape]]:
-    for name, field in shape.fields:
-        if isinstance(field, Nested):
-            yield from _leaves(field, f"{prefix}{name}.")
-        else:
-            yield prefix + name, field
-
-
-def _builder(shape: Nested) -> Callable[[Iterator[Any]], Any]:
-    """Return the function that makes the Struct from its leaves, in wire order."""
-    struct_type = shape.struct_type
-    makers = [_builder(field) if isinstance(field, Nested) else next for _, field in shape.fields]
-    names = [name for name, _ in shape.fields]
-    if tuple(names) != tuple(_positional(struct_type)):
-        raise TypeError(f"{shape.ros_name}: fields must be positional, in order")
-    return lambda leaves: struct_type(*[make(leaves) for make in makers])
-
-
-def _positional(struct_type: Any) -> tuple[str, ...]:
-    origin = getattr(struct_type, "__origin__", struct_type)
-    fields: tuple[str, ...] = origin.__struct_fields__
-    return fields
 
 
 def _format(items: list[tuple[str, Scalar, int | None]], start: int) -> str:

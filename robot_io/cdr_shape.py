@@ -6,12 +6,14 @@ A message is a `msgspec.Struct`; its annotations say how each field goes on the 
     Annotated[int, "uint8"]   any other width            tuple[X, ...] -> X[]                 Struct -> nested
     tuple[X, X, X] -> X[3]    (all of one type)  Annotated[tuple[X, ...], 36] -> X[36]
 
+ROS 2 wants field names in lower case: `force_N` is `force_n` there.
 A nested type is called `push_msgs/msg/<ClassName>` unless it has a class variable `__ros_name__`.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, get_args, get_origin
@@ -34,7 +36,7 @@ PRIMITIVES: dict[str, tuple[str, int]] = {
     "float64": ("d", 8),
 }
 _FLOATS = ("float32", "float64")
-_FIELD_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+_FIELD_NAME = re.compile(r"(?!.*__)(?!.*_\Z)[a-z][a-z0-9_]*\Z")
 _SEPARATOR = "=" * 80
 
 
@@ -120,6 +122,31 @@ def schema_text(shape: Nested) -> str:
     return "".join(blocks)
 
 
+def leaves(shape: Nested, prefix: str = "") -> Iterator[tuple[str, Shape]]:
+    """Yield the dotted path and shape of every field that is not itself a Struct, in wire order."""
+    for name, field in shape.fields:
+        if isinstance(field, Nested):
+            yield from leaves(field, f"{prefix}{name}.")
+        else:
+            yield prefix + name, field
+
+
+def builder(shape: Nested) -> Callable[[Iterator[Any]], Any]:
+    """Return the function that makes the Struct from the values of its leaves, in wire order."""
+    struct_type = shape.struct_type
+    makers = [builder(field) if isinstance(field, Nested) else next for _, field in shape.fields]
+    names = [name for name, _ in shape.fields]
+    if tuple(names) != tuple(_positional(struct_type)):
+        raise TypeError(f"{shape.ros_name}: fields must be positional, in order")
+    return lambda found: struct_type(*[make(found) for make in makers])
+
+
+def _positional(struct_type: Any) -> tuple[str, ...]:
+    origin = getattr(struct_type, "__origin__", struct_type)
+    fields: tuple[str, ...] = origin.__struct_fields__
+    return fields
+
+
 def _with_width(shape: Shape, note: str, annotation: Any) -> Shape:
     if not isinstance(shape, Scalar) or note not in PRIMITIVES:
         raise TypeError(f"{annotation!r}: {note!r} is not a ROS 2 number type")
@@ -147,7 +174,7 @@ def _shape_of_struct(annotation: Any, struct_type: type[msgspec.Struct]) -> Nest
     if struct_type.__struct_config__.tag is not None:
         raise TypeError(f"{annotation!r}: tagged types have no ROS 2 form")
     for field in msgspec.structs.fields(annotation):
-        if not _FIELD_NAME.match(field.name):
+        if not _FIELD_NAME.match(_ros_field(field.name)):
             raise TypeError(f"{struct_type.__name__}.{field.name} is no ROS 2 field name")
         try:
             fields.append((field.name, shape_of(field.type)))
@@ -175,7 +202,10 @@ def _collect(shape: Shape, into: dict[str, Nested]) -> None:
 
 
 def _definition(shape: Nested) -> str:
-    return "".join(f"{_type_name(field)} {name}\n" for name, field in shape.fields)
+    names = [_ros_field(name) for name, _ in shape.fields]
+    if len(set(names)) != len(names):
+        raise TypeError(f"two fields of {shape.ros_name} have the same ROS name")
+    return "".join(f"{_type_name(field)} {name}\n" for name, (_, field) in zip(names, shape.fields, strict=True))
 
 
 def _type_name(shape: Shape) -> str:
@@ -190,6 +220,10 @@ def _type_name(shape: Shape) -> str:
             return f"{_type_name(element)}[{'' if length is None else length}]"
         case Nested(_, name):
             return _short(name)
+
+
+def _ros_field(name: str) -> str:
+    return name.lower()
 
 
 def _short(ros_name: str) -> str:

@@ -306,7 +306,28 @@ class Empty(msgspec.Struct):
     pass
 
 
-@pytest.mark.parametrize("bad", [WithDict, WithMixedTuple, WithWrongWidth, Empty])
+class WithUnitInName(msgspec.Struct):
+    force_N: float
+    pose_m: float
+
+
+class SameNameInRos(msgspec.Struct):
+    f_n: float
+    f_N: float
+
+
+class Underscore(msgspec.Struct):
+    from_: float
+
+
+def test_field_names_are_lower_case_in_the_schema_because_other_parsers_insist():
+    cdr_type = CdrType(WithUnitInName, "push_msgs/msg/WithUnitInName")
+    assert cdr_type.schema_text == "float64 force_n\nfloat64 pose_m\n"
+    decode = generate_dynamic(cdr_type.name, cdr_type.schema_text)[cdr_type.name]
+    assert decode(cdr_type.encode(WithUnitInName(2.5, 1.0))).force_n == 2.5
+
+
+@pytest.mark.parametrize("bad", [WithDict, WithMixedTuple, WithWrongWidth, Empty, SameNameInRos, Underscore])
 def test_types_without_a_ros_form_are_refused_when_declared(bad):
     with pytest.raises(TypeError):
         CdrType(bad, "push_msgs/msg/Bad")
