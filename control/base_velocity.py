@@ -1,0 +1,29 @@
+"""From a wanted WORLD velocity to the command the base takes in its BODY frame, with the heading held."""
+
+from __future__ import annotations
+
+import math
+
+from control.path import wrap
+from robot_io.messages import BodyTwist, WorldTwist
+
+
+def body_from_world(twist: WorldTwist, yaw: float) -> BodyTwist:
+    """Rotate a WORLD velocity into the BODY frame by the *measured* heading `yaw` (rad)."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return BodyTwist(cos * twist.vx + sin * twist.vy, cos * twist.vy - sin * twist.vx, twist.omega)
+
+
+def heading_rate(yaw_wanted: float, yaw: float, gain_per_s: float, limit_rad_per_s: float) -> float:
+    """Return the turn rate in rad/s that brings the base back to `yaw_wanted`."""
+    return min(max(gain_per_s * wrap(yaw_wanted - yaw), -limit_rad_per_s), limit_rad_per_s)
+
+
+def contact_point_world(x: float, y: float, yaw: float, contact_x: float, contact_y: float) -> tuple[float, float]:
+    """Return the centre of the contact ball in the WORLD frame, m.
+
+    x, y, yaw: measured pose of the base. contact_x, contact_y: ball centre in the BODY frame. The point where
+    ball and object touch differs from the centre by R sin(angle) sideways, R being the ball's radius.
+    """
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return x + cos * contact_x - sin * contact_y, y + sin * contact_x + cos * contact_y

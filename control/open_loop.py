@@ -1,0 +1,8 @@
+"""The baseline of the paper's experiment: straight along the path, whatever the force says."""
+
+from __future__ import annotations
+
+
+def push_angle() -> float:
+    """Return theta_p = 0: along the path."""
+    return 0.0

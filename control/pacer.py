@@ -1,0 +1,25 @@
+"""Pure pacing: absolute deadlines on a fixed grid, whole periods skipped and counted, never a burst."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class Wake(msgspec.Struct, frozen=True, gc=False):
+    """What the pacer says of one wake-up: its deadline, lateness (ns), skipped periods, and the next deadline."""
+
+    deadline_ns: int
+    late_ns: int
+    skipped: int
+    next_deadline_ns: int
+
+
+def wake(deadline_ns: int, period_ns: int, now_ns: int) -> Wake:
+    """Judge a wake-up at `now_ns` for `deadline_ns`.
+
+    Skips as many whole periods as have passed and keeps the phase of the grid: the tick that runs now belongs
+    to the newest deadline not after `now_ns`.
+    """
+    skipped = max(0, (now_ns - deadline_ns) // period_ns)
+    served_ns = deadline_ns + skipped * period_ns
+    return Wake(served_ns, now_ns - served_ns, skipped, served_ns + period_ns)

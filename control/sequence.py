@@ -1,0 +1,233 @@
+"""The sequence of a push: settle, tare, approach, push (and lose, and find again), rest, retreat, check."""
+
+from __future__ import annotations
+
+import math
+
+from msgspec.structs import replace
+
+from control import push_law, tare
+from control.sensing import in_contact
+from control.settings import Settings
+from control.speed_profile import approach_speed, push_speed
+from robot_io.messages import LinkState
+from robot_io.tick import ControlState, Operator, Phase, TickInput
+
+FRESH_NS = 100_000_000
+SETTLE_PACKETS = 20
+"""Packets of each device before the start is believed."""
+REST_SPEED_M_PER_S = 0.01
+REST_NS = 300_000_000
+CHECK_NS = 700_000_000
+"""The post-run check waits this long at rest, so that the filter has forgotten the contact."""
+OVERDUE_CONTACT_M = 0.5
+"""No contact this far beyond where it was expected: the object is not there."""
+BACKWARD_RAD = math.pi / 2
+S = 1e-9
+
+
+def advance(settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float]) -> ControlState:
+    """Return the state after the phase logic of one tick; `contact` is the ball centre in the WORLD frame."""
+    along = settings.path.along(*contact)
+    progress = along - state.contact_from_m if state.contact_seen else 0.0
+    state = replace(state, progress_m=progress, lateral_m=settings.path.lateral(*contact))
+    state = _note_rest(state, inp)
+    phase = Phase(state.phase)
+    if phase == Phase.SETTLE:
+        return _settle(settings, state, inp, along)
+    if phase == Phase.TARE:
+        return _tare(settings, state, inp, along)
+    if phase == Phase.APPROACH:
+        return _approach(settings, state, inp, contact, along)
+    if phase in (Phase.PUSH, Phase.LOST):
+        return _push(settings, state, inp, contact)
+    if phase == Phase.LOST_HOLD:
+        return _lost_hold(settings, state, inp, contact, along)
+    if phase == Phase.REST:
+        return _rest(settings, state, inp, contact)
+    if phase == Phase.RETREAT:
+        return _retreat(settings, state, inp, contact)
+    if phase == Phase.CHECK:
+        return _check(state, inp)
+    return replace(state, speed=0.0)
+
+
+def _enter(state: ControlState, phase: Phase, now_ns: int, **changes: object) -> ControlState:
+    return replace(state, phase=int(phase), phase_since_ns=now_ns, **changes)
+
+
+def _note_rest(state: ControlState, inp: TickInput) -> ControlState:
+    twist = inp.base.odometry
+    rest = math.hypot(twist.vx, twist.vy) < REST_SPEED_M_PER_S and state.speed == 0.0
+    since = (state.rest_since_ns or inp.now_ns) if rest else 0
+    return state if since == state.rest_since_ns else replace(state, rest_since_ns=since)
+
+
+def _rested(state: ControlState, now_ns: int, for_ns: int) -> bool:
+    # Rest counts from the phase's own start: the base also stands still before it has begun to move.
+    return state.rest_since_ns > 0 and now_ns - max(state.rest_since_ns, state.phase_since_ns) >= for_ns
+
+
+def everyone_spoke(inp: TickInput) -> bool:
+    """Tell whether every device has given enough fresh data to start."""
+    arm, base = inp.arm, inp.base
+    return (
+        inp.ft.packets_ok >= SETTLE_PACKETS
+        and arm.link == LinkState.UP
+        and arm.packets >= SETTLE_PACKETS
+        and inp.now_ns - arm.published_ns <= FRESH_NS
+        and base.pose_valid
+        and base.pose_seq >= SETTLE_PACKETS
+        and inp.now_ns - base.pose_received_ns <= FRESH_NS
+        and base.odometry_seq > 0
+        and inp.now_ns - base.odometry_received_ns <= FRESH_NS
+    )
+
+
+def _settle(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
+    if not everyone_spoke(inp):
+        return state
+    held = replace(state, held_yaw=inp.base.pose.yaw, held_joints=inp.arm.joints.position, approach_from_m=along)
+    if not settings.in_contact:
+        return _enter(held, Phase.TARE, inp.now_ns)
+    return _enter(
+        held,
+        Phase.PUSH,
+        inp.now_ns,
+        contact_seen=True,
+        contact_from_m=along,
+        ramp_since_ns=inp.now_ns,
+        ramp_from_speed=0.0,
+    )
+
+
+def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
+    if state.refusal or state.tare.count < tare.wanted_readings(settings.ft):
+        return state
+    refusal, bias = tare.judge(state.tare, settings.ft)
+    if refusal:
+        return replace(state, refusal=int(refusal))
+    return _enter(
+        state,
+        Phase.APPROACH,
+        inp.now_ns,
+        tared=True,
+        bias_force=bias[:3],
+        bias_torque=bias[3:],
+        approach_from_m=along,
+    )
+
+
+def _approach(
+    settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float], along: float
+) -> ControlState:
+    control = settings.control
+    if state.contact_run >= control.contact_samples:
+        return _enter(
+            state,
+            Phase.PUSH,
+            inp.now_ns,
+            contact_seen=True,
+            contact_from_m=along,
+            progress_m=0.0,
+            ramp_since_ns=inp.now_ns,
+            ramp_from_speed=state.speed,
+        )
+    if along - state.approach_from_m > settings.expected_contact_m + OVERDUE_CONTACT_M:
+        return _enter(state, Phase.LOST_HOLD, inp.now_ns, speed=0.0)
+    elapsed_s = (inp.now_ns - state.phase_since_ns) * S
+    return replace(state, speed=approach_speed(elapsed_s, control.approach_speed_m_per_s, control.ramp_s), theta_p=0.0)
+
+
+def _push(settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float]) -> ControlState:
+    control = settings.control
+    remaining = control.distance_m - state.progress_m
+    touching = in_contact(settings, state)
+    if touching and remaining <= 0.0:
+        return _enter(state, Phase.REST, inp.now_ns, speed=0.0)
+    elapsed_s = (inp.now_ns - state.ramp_since_ns) * S
+    speed = push_speed(
+        elapsed_s, state.ramp_from_speed, control.push_speed_m_per_s, control.ramp_s, max(remaining, 0.001)
+    )
+    if not touching:
+        return _without_force(settings, state, inp, contact, speed)
+    if state.phase == Phase.LOST:
+        state = _enter(state, Phase.PUSH, inp.now_ns)
+    force = settings.path.vector_to_path(state.force_world[0], state.force_world[1])
+    theta_f = push_law.force_angle(*force)
+    if control.controller == "force":
+        theta_p = push_law.push_angle(theta_f, state.lateral_m, control.k_f, control.k_y_rad_per_m)
+    else:
+        theta_p = 0.0
+    if abs(theta_p) <= BACKWARD_RAD:
+        return replace(state, theta_f=theta_f, theta_p=theta_p, speed=speed, backward_ticks=0)
+    # Beyond 90 degrees the law would pull: the direction stays as it was and safety counts the ticks (F56).
+    return replace(state, theta_f=theta_f, speed=speed, backward_ticks=state.backward_ticks + 1)
+
+
+def _without_force(
+    settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float], speed: float
+) -> ControlState:
+    control = settings.control
+    if state.phase != Phase.LOST:
+        state = _enter(state, Phase.LOST, inp.now_ns, anchor_x=contact[0], anchor_y=contact[1], backward_ticks=0)
+    gone_s = (inp.now_ns - state.phase_since_ns) * S
+    gone_m = math.hypot(contact[0] - state.anchor_x, contact[1] - state.anchor_y)
+    if gone_s > control.lost_time_s or gone_m > control.lost_distance_m:
+        return _enter(state, Phase.LOST_HOLD, inp.now_ns, speed=0.0)
+    k_y = control.k_y_rad_per_m if control.controller == "force" else 0.0
+    turn = control.lost_turn_rate_rad_per_s * settings.period_s
+    return replace(state, theta_p=push_law.return_angle(state.theta_p, state.lateral_m, k_y, turn), speed=speed)
+
+
+def _lost_hold(
+    settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float], along: float
+) -> ControlState:
+    state = replace(state, speed=0.0)
+    if inp.operator == Operator.RESUME:
+        if state.contact_seen:
+            return _enter(
+                state,
+                Phase.LOST,
+                inp.now_ns,
+                anchor_x=contact[0],
+                anchor_y=contact[1],
+                ramp_since_ns=inp.now_ns,
+                ramp_from_speed=0.0,
+            )
+        return _enter(state, Phase.APPROACH, inp.now_ns, approach_from_m=along)
+    if _rested(state, inp.now_ns, round(settings.control.lost_rest_s / S)):
+        return _enter(state, Phase.FAILED, inp.now_ns, end_progress_m=state.progress_m, end_lateral_m=state.lateral_m)
+    return state
+
+
+def _rest(settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float]) -> ControlState:
+    if not _rested(state, inp.now_ns, REST_NS):
+        return replace(state, speed=0.0)
+    after = Phase.RETREAT if settings.control.retreat_m > 0.0 else Phase.DONE
+    return _enter(
+        state,
+        after,
+        inp.now_ns,
+        end_progress_m=state.progress_m,
+        end_lateral_m=state.lateral_m,
+        anchor_x=contact[0],
+        anchor_y=contact[1],
+    )
+
+
+def _retreat(settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float]) -> ControlState:
+    control = settings.control
+    gone_m = math.hypot(contact[0] - state.anchor_x, contact[1] - state.anchor_y)
+    if gone_m >= control.retreat_m:
+        return _enter(state, Phase.CHECK, inp.now_ns, speed=0.0)
+    elapsed_s = (inp.now_ns - state.phase_since_ns) * S
+    speed = approach_speed(elapsed_s, control.approach_speed_m_per_s, control.ramp_s)
+    return replace(state, speed=speed, theta_p=math.pi)
+
+
+def _check(state: ControlState, inp: TickInput) -> ControlState:
+    if not _rested(state, inp.now_ns, CHECK_NS):
+        return replace(state, speed=0.0)
+    force = state.force_world
+    return _enter(state, Phase.DONE, inp.now_ns, speed=0.0, residual_N=math.hypot(force[0], force[1], force[2]))

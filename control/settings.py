@@ -1,0 +1,40 @@
+"""What control needs of a rig file, resolved once."""
+
+from __future__ import annotations
+
+import msgspec
+
+from control.path import StraightPath
+from robot_io.config import ControlConfig, FtConfig, Matrix3, RigConfig
+
+
+class Settings(msgspec.Struct, frozen=True, gc=False):
+    """Gains, path and constants of the rig; `in_contact` starts without approach, with a saved tare."""
+
+    control: ControlConfig
+    ft: FtConfig
+    path: StraightPath
+    base_from_sensor: Matrix3
+    contact_x: float
+    contact_y: float
+    """Contact ball centre in the BODY frame, m."""
+    expected_contact_m: float
+    period_s: float
+    """Period of the loop, s."""
+    in_contact: bool
+
+    @classmethod
+    def of(cls, rig: RigConfig, *, in_contact: bool = False) -> Settings:
+        """Resolve the settings of a rig."""
+        contact_x, contact_y, _ = rig.frames.contact_in_base_m
+        return cls(
+            rig.control,
+            rig.ft,
+            StraightPath.of(rig.path),
+            rig.frames.base_from_sensor,
+            contact_x,
+            contact_y,
+            rig.path.expected_contact_m,
+            1.0 / rig.loop.rate_hz,
+            in_contact,
+        )

@@ -1,0 +1,255 @@
+"""Everything one tick of the loop consumes and produces: the record that the log holds and replay folds again.
+
+`TickInput` is all the outside world the tick sees. `TickState` is all it remembers. `TickOutput` is all it
+says. A run is a fold of (state, input) -> (state, output), and `/control/tick` holds every part of it.
+Times are CLOCK_MONOTONIC ns. Angles without a frame in their name are in the PATH frame.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, ClassVar
+
+import msgspec
+
+from robot_io.arm_record import ArmRecord
+from robot_io.base_record import BaseRecord
+from robot_io.cdr import CdrType
+from robot_io.messages import BodyTwist, WorldTwist
+
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+U32 = Annotated[int, "uint32"]
+
+
+class Phase(IntEnum):
+    """Where the push is in its sequence."""
+
+    SETTLE = 0
+    """Waiting until every device has spoken."""
+    TARE = 1
+    """At rest, out of contact: measuring bias and tool weight."""
+    APPROACH = 2
+    """Along the path until the force says contact."""
+    PUSH = 3
+    LOST = 4
+    """The force is gone: circling back towards the path for a short while."""
+    LOST_HOLD = 5
+    """Given up circling: at rest, waiting for the operator for a moment."""
+    REST = 6
+    """The distance is reached: coming to rest."""
+    RETREAT = 7
+    """A few centimetres back, out of contact."""
+    CHECK = 8
+    """At rest, out of contact: does the sensor still read zero?"""
+    DONE = 9
+    FAILED = 10
+
+
+class Mode(IntEnum):
+    """The supervisor's mode; a higher number is a stronger reaction."""
+
+    SILENT = 0
+    READY = 1
+    PUSHING = 2
+    SLOW = 3
+    HOLD = 4
+    STOP = 5
+    DEAD = 6
+
+
+class Operator(IntEnum):
+    """What the operator asked for since the last tick."""
+
+    NONE = 0
+    STOP = 1
+    RESUME = 2
+
+
+class FtReading(msgspec.Struct, frozen=True, gc=False):
+    """One packet of the force-torque sensor: N, N*m in the SENSOR frame, bias still in it."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/FtReading"
+    received_ns: int
+    seq: int
+    force: Vector3
+    torque: Vector3
+
+
+class FtInput(msgspec.Struct, frozen=True, gc=False):
+    """The sensor since the last tick: every packet, oldest first, and the state of its link."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/FtInput"
+    readings: tuple[FtReading, ...]
+    link: int
+    packets_ok: int
+    crc_fail: int
+    junk_bytes: int
+
+
+class HostInput(msgspec.Struct, frozen=True, gc=False):
+    """The host: how late this tick woke, how many periods were skipped before it, and who is still alive."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/HostInput"
+    late_ns: int
+    skipped: int
+    gate_alive: bool
+    arm_alive: bool
+    recorder_alive: bool
+    loop_error: bool
+    log_dropped: int
+
+
+class TickInput(msgspec.Struct, frozen=True, gc=False):
+    """Everything the tick sees of the world."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/TickInput"
+    tick: int
+    now_ns: int
+    operator: int
+    host: HostInput
+    ft: FtInput
+    arm: ArmRecord
+    base: BaseRecord
+
+
+class TareState(msgspec.Struct, frozen=True, gc=False):
+    """Running sums of the tare: N, N*m in the SENSOR frame."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/TareState"
+    count: int = 0
+    total: Vector6 = (0.0,) * 6
+    squares: Vector6 = (0.0,) * 6
+    first_half: Vector6 = (0.0,) * 6
+    """Sum of the first half of the wanted samples, to see a drift."""
+
+
+class ControlState(msgspec.Struct, frozen=True, gc=False):
+    """What control remembers from tick to tick."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/ControlState"
+    phase: int = 0
+    phase_since_ns: int = 0
+    tared: bool = False
+    refusal: int = 0
+    """Why the tare was refused: 0 not, 1 unsettled, 2 nearly saturated."""
+    bias_force: Vector3 = (0.0, 0.0, 0.0)
+    bias_torque: Vector3 = (0.0, 0.0, 0.0)
+    tare: TareState = TareState()
+    last_reading_ns: int = 0
+    force_world: Vector3 = (0.0, 0.0, 0.0)
+    """Filtered force on the slider, N, WORLD frame."""
+    force_valid: bool = False
+    contact_run: int = 0
+    """Consecutive readings above the contact threshold."""
+    held_joints: Vector6 = (0.0,) * 6
+    held_yaw: float = 0.0
+    approach_from_m: float = 0.0
+    """Where along the path the approach started."""
+    contact_seen: bool = False
+    contact_from_m: float = 0.0
+    """Where along the path the first contact was."""
+    progress_m: float = 0.0
+    lateral_m: float = 0.0
+    theta_f: float = 0.0
+    theta_p: float = 0.0
+    speed: float = 0.0
+    ramp_since_ns: int = 0
+    ramp_from_speed: float = 0.0
+    anchor_x: float = 0.0
+    anchor_y: float = 0.0
+    """Contact point in the WORLD frame where LOST or RETREAT began, m."""
+    rest_since_ns: int = 0
+    backward_ticks: int = 0
+    end_progress_m: float = 0.0
+    end_lateral_m: float = 0.0
+    residual_N: float = float("nan")
+    """Force left after the run, out of contact; NaN when it was not checked."""
+
+
+class SafetyState(msgspec.Struct, frozen=True, gc=False):
+    """What safety remembers from tick to tick."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/SafetyState"
+    mode: int = 0
+    first_ns: int = 0
+    """When the first tick ran."""
+    latched: tuple[str, ...] = ()
+    """Faults that only the operator or a restart clears."""
+    clean_since_ns: int = 0
+    """Since when no clearing fault has asked for SLOW or HOLD."""
+    stop_since_ns: int = 0
+    zero_since_ns: int = 0
+    """Since when the command has been zero (0: it is not)."""
+    grace_ticks: int = 0
+    """Ticks left in which a pause of the host is not taken for a dead device."""
+    last_ft_ns: int = 0
+    frozen_run: int = 0
+    last_ft_force: Vector3 = (0.0, 0.0, 0.0)
+    last_ft_torque: Vector3 = (0.0, 0.0, 0.0)
+    arm_velocity_run: int = 0
+    overspeed_run: int = 0
+    overspeed_seq: int = 0
+    ignore_since_ns: int = 0
+    moving_since_ns: int = 0
+    pose_seq: int = 0
+    pose_x: float = 0.0
+    pose_y: float = 0.0
+    pose_yaw: float = 0.0
+    pose_ns: int = 0
+    pose_jumps: int = 0
+    recorder_gone_ns: int = 0
+    late_run: int = 0
+
+
+class EnvelopeState(msgspec.Struct, frozen=True, gc=False):
+    """The last command, for the rate limit: m/s, m/s, rad/s in the BODY frame."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/EnvelopeState"
+    last: BodyTwist = BodyTwist()
+    clamps: int = 0
+    """How often a velocity had to be clamped, in all."""
+    clamped: bool = False
+    """Whether this tick's was."""
+
+
+class TickState(msgspec.Struct, frozen=True, gc=False):
+    """All that is remembered from tick to tick."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/TickState"
+    control: ControlState = ControlState()
+    safety: SafetyState = SafetyState()
+    envelope: EnvelopeState = EnvelopeState()
+
+
+class TickOutput(msgspec.Struct, frozen=True, gc=False):
+    """What the tick says."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/TickOutput"
+    mode: int
+    faults: tuple[str, ...]
+    wanted_world: WorldTwist
+    wanted_body: BodyTwist
+    """Before the envelope."""
+    command_body: BodyTwist
+    """After the envelope: what goes to the gate."""
+    contact_x: float
+    contact_y: float
+    """Contact ball centre, m, WORLD frame."""
+    finished: bool
+    exit_code: int
+
+
+class ControlTick(msgspec.Struct, frozen=True, gc=False):
+    """The message on `/control/tick`. `crc32_before` chains it to the message before (0 at the start of a file)."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/ControlTick"
+    crc32_before: U32
+    reserved: U32
+    input: TickInput
+    before: TickState
+    after: TickState
+    output: TickOutput
+
+
+TICK_CDR = CdrType(ControlTick, "push_msgs/msg/ControlTick")

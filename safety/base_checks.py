@@ -1,0 +1,123 @@
+"""Does the base answer, stand where it says, and move as it was told?"""
+
+from __future__ import annotations
+
+import math
+
+from msgspec.structs import replace
+
+from robot_io.tick import ControlState, Mode, SafetyState, TickInput
+from safety.gate import Latch
+from safety.settings import SafetySettings
+
+STALE_HOLD_NS = 100_000_000
+STALE_STOP_NS = 250_000_000
+POSE_SLOW_PERIODS, POSE_STOP_PERIODS = 3, 6
+POSE_SLOW_FLOOR_NS, POSE_STOP_FLOOR_NS = 50_000_000, 120_000_000
+GATE_RECORD_STOP_NS = 100_000_000
+OVERSPEED_FACTOR = 1.3
+OVERSPEED_SAMPLES = 2
+IGNORE_M_PER_S = 0.05
+IGNORE_NS = 300_000_000
+MOVING_M_PER_S = 0.03
+MOVING_NS = 100_000_000
+STOPPING_NS = 200_000_000
+BASE_DECELERATION = 2.5
+"""m/s^2, what the Ridgeback's own controller allows."""
+JUMP_M, JUMP_RAD = 0.03, 0.05
+JUMPS = 3
+
+
+def check(
+    settings: SafetySettings, state: SafetyState, inp: TickInput, control: ControlState
+) -> tuple[SafetyState, list[str]]:
+    """Return the state and the active faults of base, localisation and gate."""
+    faults = _of_link(settings, inp)
+    state, pose_faults = _of_pose(settings, state, inp, control)
+    state, motion_faults = _of_motion(settings, state, inp)
+    return state, faults + pose_faults + motion_faults
+
+
+def _of_link(settings: SafetySettings, inp: TickInput) -> list[str]:
+    base = inp.base
+    faults: list[str] = []
+    if base.latched and base.latch_cause == Latch.LINK:
+        faults.append("F30")
+    elif base.latched or not inp.host.gate_alive:
+        faults.append("F67")
+    if inp.now_ns - base.published_ns > GATE_RECORD_STOP_NS:
+        faults.append("F67-late")
+    silent_ns = inp.now_ns - base.newest_inbound_ns
+    if silent_ns > STALE_STOP_NS:
+        faults.append("F31-stop")
+    elif silent_ns > STALE_HOLD_NS:
+        faults.append("F31-hold")
+    if base.status_received_ns and (base.status.stop_engaged or not base.status.drivers_active):
+        faults.append("F38")
+    return faults
+
+
+def _of_pose(
+    settings: SafetySettings, state: SafetyState, inp: TickInput, control: ControlState
+) -> tuple[SafetyState, list[str]]:
+    base, pose = inp.base, inp.base.pose
+    faults: list[str] = []
+    age_ns = inp.now_ns - base.pose_received_ns
+    if age_ns > max(POSE_STOP_PERIODS * settings.pose_period_ns, POSE_STOP_FLOOR_NS):
+        faults.append("F40-stop")
+    elif age_ns > max(POSE_SLOW_PERIODS * settings.pose_period_ns, POSE_SLOW_FLOOR_NS):
+        faults.append("F40-slow")
+    if not (base.pose_valid and math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)):
+        return state, [*faults, "F42"]
+    if base.pose_seq != state.pose_seq:
+        jumps = 0
+        if state.pose_seq:
+            time_s = (base.pose_received_ns - state.pose_ns) * 1e-9
+            moved = math.hypot(pose.x - state.pose_x, pose.y - state.pose_y)
+            turned = abs(math.remainder(pose.yaw - state.pose_yaw, math.tau))
+            speed, turn = settings.envelope.speed * OVERSPEED_FACTOR, settings.envelope.turn_rate * OVERSPEED_FACTOR
+            far = moved > JUMP_M + speed * time_s or turned > JUMP_RAD + turn * time_s
+            jumps = state.pose_jumps + 1 if far else 0
+        # A jump keeps the old reference, so that a pose that stays away is counted again and again.
+        if jumps == 0:
+            state = replace(state, pose_x=pose.x, pose_y=pose.y, pose_yaw=pose.yaw, pose_ns=base.pose_received_ns)
+        state = replace(state, pose_seq=base.pose_seq, pose_jumps=jumps)
+    if state.pose_jumps >= JUMPS:
+        faults.append("F41")
+    if abs(math.remainder(pose.yaw - control.held_yaw, math.tau)) > settings.max_heading_error:
+        faults.append("F44")
+    return state, faults
+
+
+def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> tuple[SafetyState, list[str]]:
+    base, twist = inp.base, inp.base.odometry
+    faults: list[str] = []
+    speed = math.hypot(twist.vx, twist.vy)
+    run, seq = state.overspeed_run, state.overspeed_seq
+    if base.odometry_seq != seq:
+        limits = settings.envelope
+        fast = not (
+            speed <= OVERSPEED_FACTOR * limits.speed and abs(twist.omega) <= OVERSPEED_FACTOR * limits.turn_rate
+        )
+        run, seq = (run + 1 if fast else 0), base.odometry_seq
+    if run >= OVERSPEED_SAMPLES:
+        faults.append("F35")
+    sent = base.sent
+    off = math.hypot(twist.vx - sent.vx, twist.vy - sent.vy)
+    ignoring = off > IGNORE_M_PER_S and state.mode >= Mode.PUSHING and state.mode < Mode.STOP
+    ignore_since = (state.ignore_since_ns or inp.now_ns) if ignoring else 0
+    if ignore_since and inp.now_ns - ignore_since > IGNORE_NS:
+        faults.append("F33")
+    zero_ns = inp.now_ns - state.zero_since_ns if state.zero_since_ns else 0
+    settled = zero_ns > STOPPING_NS + settings.envelope.speed / BASE_DECELERATION * 1e9
+    moving = settled and speed > MOVING_M_PER_S and state.mode >= Mode.STOP
+    moving_since = (state.moving_since_ns or inp.now_ns) if moving else 0
+    if moving_since and inp.now_ns - moving_since > MOVING_NS:
+        faults.append("F34")
+    return replace(
+        state,
+        overspeed_run=run,
+        overspeed_seq=seq,
+        ignore_since_ns=ignore_since,
+        moving_since_ns=moving_since,
+    ), faults

@@ -1,0 +1,169 @@
+"""The gate's judgement, pure: which command may reach the base, and when zero is sent instead.
+
+The gate is the last line. It forwards a command only when it is fresh, finite, in sequence and inside the
+envelope; on silence, EOF or nonsense it sends zero and latches, and nothing but a restart unlatches it. It
+knows nothing of forces or paths, so that nothing up there can be wrong in a way that matters down here.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+import msgspec
+
+from robot_io.gate_frame import GateFrame
+from robot_io.messages import BodyTwist
+
+ZERO = BodyTwist()
+
+FRAME_MAX_AGE_NS = 50_000_000
+"""Silence of control for five ticks latches the gate, and so does a frame that is older when it is read."""
+STEP_MARGIN = 1.2
+"""A step of the command may exceed the acceleration limit by this much (rounding, lateness)."""
+REPEAT_NS = 18_000_000
+"""Unchanged or growing commands leave every 20 ms (less the jitter of a tick); reduced and zero ones leave at once."""
+OVERSPEED_FACTOR = 1.3
+OVERSPEED_SAMPLES = 3
+
+
+class Latch(IntEnum):
+    """Why the gate has latched."""
+
+    NONE = 0
+    SILENCE = 1
+    EOF = 2
+    NONSENSE = 3
+    SEQUENCE = 4
+    STALE = 5
+    NOT_FINITE = 6
+    ENVELOPE = 7
+    STEP = 8
+    FROZEN_TICK = 9
+    OVERSPEED = 10
+    LINK = 11
+
+
+LATCH_TEXT = {
+    Latch.NONE: "not latched",
+    Latch.SILENCE: "control was silent for 50 ms",
+    Latch.EOF: "control is gone",
+    Latch.NONSENSE: "control sent something that is not a frame",
+    Latch.SEQUENCE: "a frame of control is missing or doubled",
+    Latch.STALE: "control's frame was older than 50 ms",
+    Latch.NOT_FINITE: "control sent a velocity that is not a number",
+    Latch.ENVELOPE: "control sent a velocity beyond the envelope",
+    Latch.STEP: "control's velocity jumped",
+    Latch.FROZEN_TICK: "control's tick stands still",
+    Latch.OVERSPEED: "the base is faster than the envelope",
+    Latch.LINK: "the base link is gone",
+}
+
+
+class GateLimits(msgspec.Struct, frozen=True, gc=False):
+    """m/s, rad/s, m/s^2, rad/s^2, and the period of control's ticks in ns."""
+
+    speed: float
+    turn_rate: float
+    acceleration: float
+    turn_acceleration: float
+    period_ns: int
+
+
+class GateState(msgspec.Struct, frozen=True, gc=False):
+    """What the gate remembers: the last frame, what was sent last and when, and why it latched."""
+
+    latch: Latch = Latch.NONE
+    seq: int = 0
+    tick: int = -1
+    frame_ns: int = 0
+    """When the last good frame arrived; 0 before the first."""
+    twist: BodyTwist = ZERO
+    """The last accepted command."""
+    sent: BodyTwist = ZERO
+    sent_ns: int = 0
+    overspeed: int = 0
+
+
+def on_frame(limits: GateLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> GateState:
+    """Judge one frame (None: nonsense) read at `now_ns`; a bad one latches."""
+    if state.latch:
+        return state
+    latch = _judge(limits, state, frame, now_ns)
+    if latch or frame is None:
+        return latched(state, latch)
+    return GateState(Latch.NONE, frame.seq, frame.tick, now_ns, frame.twist, state.sent, state.sent_ns, state.overspeed)
+
+
+def on_clock(state: GateState, now_ns: int) -> GateState:
+    """Latch when control has been silent too long (never before its first frame)."""
+    if not state.latch and state.frame_ns and now_ns - state.frame_ns > FRAME_MAX_AGE_NS:
+        return latched(state, Latch.SILENCE)
+    return state
+
+
+def on_speed(limits: GateLimits, state: GateState, twist: BodyTwist) -> GateState:
+    """Count measured speeds (odometry, BODY frame) beyond the envelope; three in a row latch."""
+    fast = not (
+        math.hypot(twist.vx, twist.vy) <= OVERSPEED_FACTOR * limits.speed
+        and abs(twist.omega) <= OVERSPEED_FACTOR * limits.turn_rate
+    )
+    count = state.overspeed + 1 if fast else 0
+    state = msgspec.structs.replace(state, overspeed=count)
+    return latched(state, Latch.OVERSPEED) if count >= OVERSPEED_SAMPLES and not state.latch else state
+
+
+def latched(state: GateState, cause: Latch) -> GateState:
+    """Return the state latched for `cause`; the first cause stays."""
+    return msgspec.structs.replace(state, latch=state.latch or cause, twist=ZERO)
+
+
+def due(state: GateState, now_ns: int) -> BodyTwist | None:
+    """Return the command to send now, or None when nothing is due yet."""
+    if state.frame_ns == 0 and not state.latch:
+        return None
+    wanted = state.twist
+    if now_ns - state.sent_ns >= REPEAT_NS or (wanted != state.sent and _reduces(wanted, state.sent)):
+        return wanted
+    return None
+
+
+def sent(state: GateState, twist: BodyTwist, now_ns: int) -> GateState:
+    """Note what really went out."""
+    return msgspec.structs.replace(state, sent=twist, sent_ns=now_ns)
+
+
+def _judge(limits: GateLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> Latch:
+    if frame is None:
+        return Latch.NONSENSE
+    if frame.seq != state.seq + 1:
+        return Latch.SEQUENCE
+    if frame.tick <= state.tick:
+        return Latch.FROZEN_TICK
+    if now_ns - frame.sent_ns > FRAME_MAX_AGE_NS:
+        return Latch.STALE
+    twist = frame.twist
+    if not (math.isfinite(twist.vx) and math.isfinite(twist.vy) and math.isfinite(twist.omega)):
+        return Latch.NOT_FINITE
+    if math.hypot(twist.vx, twist.vy) > limits.speed * (1.0 + 1e-9) or abs(twist.omega) > limits.turn_rate * (
+        1.0 + 1e-9
+    ):
+        return Latch.ENVELOPE
+    if not _reduces(twist, state.twist):
+        time_s = (frame.tick - max(state.tick, 0)) * limits.period_ns * 1e-9 if state.tick >= 0 else 0.0
+        time_s = max(time_s, limits.period_ns * 1e-9)
+        step = math.hypot(twist.vx - state.twist.vx, twist.vy - state.twist.vy)
+        turn_step = abs(twist.omega - state.twist.omega)
+        if (
+            step > STEP_MARGIN * limits.acceleration * time_s
+            or turn_step > STEP_MARGIN * limits.turn_acceleration * time_s
+        ):
+            return Latch.STEP
+    return Latch.NONE
+
+
+def _reduces(new: BodyTwist, old: BodyTwist) -> bool:
+    """Tell whether every component moves towards zero (or stays)."""
+    return all(
+        abs(b) <= abs(a) and a * b >= 0.0 for a, b in ((old.vx, new.vx), (old.vy, new.vy), (old.omega, new.omega))
+    )

@@ -1,0 +1,31 @@
+"""Is this machine keeping up, are the other processes alive, and what does the operator want?"""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from robot_io.tick import Operator, SafetyState, TickInput
+from safety.settings import SafetySettings
+
+LATE_SLOW_TICKS = 3
+LATE_SLOW_NS = 30_000_000
+RECORDER_GONE_NS = 1_000_000_000
+
+
+def check(settings: SafetySettings, state: SafetyState, inp: TickInput) -> tuple[SafetyState, list[str]]:
+    """Return the state and the active faults of the host."""
+    host = inp.host
+    faults: list[str] = []
+    run = state.late_run + 1 if host.skipped else 0
+    if host.skipped:
+        faults.append("F60-late")
+    if run >= LATE_SLOW_TICKS or host.skipped * settings.period_ns >= LATE_SLOW_NS:
+        faults.append("F60-slow")
+    gone_ns = 0 if host.recorder_alive else state.recorder_gone_ns or inp.now_ns
+    if gone_ns and inp.now_ns - gone_ns > RECORDER_GONE_NS:
+        faults.append("F63")
+    if host.loop_error:
+        faults.append("F68")
+    if inp.operator == Operator.STOP:
+        faults.append("F64")
+    return replace(state, late_run=run, recorder_gone_ns=gone_ns), faults

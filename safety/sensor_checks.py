@@ -1,0 +1,71 @@
+"""Is the force-torque sensor alive, sane and inside its limits? On raw packets, before any filter."""
+
+from __future__ import annotations
+
+import math
+
+from msgspec.structs import replace
+
+from robot_io.messages import LinkState
+from robot_io.tick import ControlState, SafetyState, TickInput
+from safety.limits import SENSOR_RANGE_N, SENSOR_RANGE_NM
+from safety.settings import SafetySettings
+
+STALE_SLOW_NS = 50_000_000
+STALE_HOLD_NS = 80_000_000
+STALE_STOP_NS = 160_000_000
+"""Robotiq's own driver calls a link bad after 160 ms without a valid packet."""
+FROZEN_PACKETS = 30
+SATURATED = 0.95
+
+
+def check(
+    settings: SafetySettings, state: SafetyState, inp: TickInput, control: ControlState
+) -> tuple[SafetyState, list[str]]:
+    """Return the state and the active faults of the sensor."""
+    faults: list[str] = []
+    last_ns, force, torque, run = state.last_ft_ns, state.last_ft_force, state.last_ft_torque, state.frozen_run
+    for reading in inp.ft.readings:
+        last_ns = max(last_ns, reading.received_ns)
+        run = run + 1 if reading.force == force and reading.torque == torque else 0
+        force, torque = reading.force, reading.torque
+        faults += _of_reading(settings, force, torque, control)
+    if inp.ft.link == LinkState.LOST:
+        faults.append("F02")
+    age_ns = inp.now_ns - last_ns
+    if age_ns > STALE_STOP_NS:
+        faults.append("F01-stop")
+    elif age_ns > STALE_HOLD_NS:
+        faults.append("F01-hold")
+    elif age_ns > STALE_SLOW_NS:
+        faults.append("F01-slow")
+    if settings.noise_floor and run >= FROZEN_PACKETS and control.speed > 0.0:
+        faults.append("F06")
+    return replace(state, last_ft_ns=last_ns, last_ft_force=force, last_ft_torque=torque, frozen_run=run), faults
+
+
+def _of_reading(
+    settings: SafetySettings,
+    force: tuple[float, float, float],
+    torque: tuple[float, float, float],
+    control: ControlState,
+) -> list[str]:
+    if not all(math.isfinite(value) for value in (*force, *torque)):
+        return ["F10"]
+    faults = []
+    if max(map(abs, force)) >= SATURATED * SENSOR_RANGE_N or max(map(abs, torque)) >= SATURATED * SENSOR_RANGE_NM:
+        faults.append("F07")
+    if not control.tared:
+        return faults
+    bias, bias_torque = control.bias_force, control.bias_torque
+    size = math.hypot(force[0] - bias[0], force[1] - bias[1], force[2] - bias[2])
+    if size > settings.max_force:
+        faults.append("F50-stop")
+    elif size > settings.slow_force:
+        faults.append("F50-slow")
+    if (
+        math.hypot(torque[0] - bias_torque[0], torque[1] - bias_torque[1], torque[2] - bias_torque[2])
+        > settings.max_torque
+    ):
+        faults.append("F51")
+    return faults

@@ -1,0 +1,55 @@
+"""What safety needs of a rig file, resolved once."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+from robot_io.config import RigConfig
+from safety.envelope import EnvelopeLimits
+from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
+
+
+class SafetySettings(msgspec.Struct, frozen=True, gc=False):
+    """Limits in SI units and times in ns."""
+
+    period_ns: int
+    max_force: float
+    slow_force: float
+    max_torque: float
+    noise_floor: bool
+    """The sensor's readings scatter, so that equal ones are a fault."""
+    hold_slow: float
+    hold_stop: float
+    servo: bool
+    max_heading_error: float
+    pose_period_ns: int
+    expected_contact_m: float
+    envelope: EnvelopeLimits
+
+    @classmethod
+    def of(cls, rig: RigConfig) -> SafetySettings:
+        """Resolve the settings of a rig."""
+        limits = rig.limits
+        period_s = 1.0 / rig.loop.rate_hz
+        return cls(
+            round(period_s * 1e9),
+            limits.max_force_N,
+            limits.slow_force_N,
+            limits.max_torque_Nm,
+            rig.ft.noise_force_N > 0.0,
+            limits.hold_slow_rad,
+            limits.hold_stop_rad,
+            rig.arm.hold == "servo",
+            math.radians(limits.max_heading_error_deg),
+            round(1e9 / rig.base.pose_rate_hz),
+            rig.path.expected_contact_m,
+            EnvelopeLimits(
+                speed_limit_m_per_s(rig),
+                MAX_TURN_RATE_RAD_PER_S,
+                limits.max_acceleration_m_per_s2,
+                limits.max_yaw_acceleration_rad_per_s2,
+                period_s,
+            ),
+        )

@@ -1,0 +1,145 @@
+"""Faults to mode, mode to ending: pure, one place, the strongest reaction wins.
+
+Escalation is immediate. De-escalation is one mode a tick, after one clean second, and only where the fault's
+row says that it clears by itself. STOP and DEAD are latched: they end the run.
+"""
+
+from __future__ import annotations
+
+import msgspec
+from msgspec.structs import replace
+
+from robot_io.messages import BodyTwist
+from robot_io.tick import ControlState, Mode, Phase, SafetyState, TickInput
+from safety import arm_checks, base_checks, host_checks, sensor_checks, task_checks
+from safety.faults import FAULTS, Clears, strongest
+from safety.settings import SafetySettings
+
+CLEAN_NS = 1_000_000_000
+REST_NS = 300_000_000
+"""After a stop the run ends once the base was told zero for this long and is measured at rest ..."""
+REST_AT_MOST_NS = 1_500_000_000
+"""... or after this long, whatever is measured (the measurement itself may be what failed)."""
+REST_SPEED_M_PER_S = 0.01
+STALENESS = ("F01", "F24", "F25", "F31", "F40", "F67-late")
+"""Faults of age: right after a pause of this host they say more about the host than about the device."""
+
+OPERATOR_EXIT = 130
+
+
+class Verdict(msgspec.Struct, frozen=True, gc=False):
+    """What the supervisor says of a tick."""
+
+    mode: Mode
+    faults: tuple[str, ...]
+    finished: bool
+    exit_code: int
+
+
+def supervise(
+    settings: SafetySettings,
+    state: SafetyState,
+    inp: TickInput,
+    control: ControlState,
+    wanted: BodyTwist,
+    clamped: bool,
+) -> tuple[SafetyState, Verdict]:
+    """Return the state and the verdict after all checks of this tick.
+
+    control: control's state after this tick. wanted: what it wants, BODY frame. clamped: whether the envelope
+    had to clamp the tick before.
+    """
+    state, faults = _gather(settings, state, inp, control, wanted, clamped)
+    faults = _after_pause(state, inp, faults)
+    state = replace(state, grace_ticks=2 if inp.host.skipped else max(state.grace_ticks - 1, 0))
+    new = tuple(i for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in state.latched)
+    latched = state.latched + new
+    asked = max(strongest(tuple(faults)), strongest(latched))
+    mode, state = _next_mode(replace(state, latched=latched), asked, control, inp.now_ns)
+    stopping = mode >= Mode.STOP
+    stop_since = (state.stop_since_ns or inp.now_ns) if stopping else 0
+    state = replace(state, mode=int(mode), stop_since_ns=stop_since)
+    finished, code = _ending(state, inp, control)
+    return state, Verdict(mode, tuple(dict.fromkeys([*latched, *faults])), finished, code)
+
+
+def note_command(state: SafetyState, command: BodyTwist, now_ns: int) -> SafetyState:
+    """Remember since when the command is zero."""
+    zero = command == BodyTwist()
+    since = (state.zero_since_ns or now_ns) if zero else 0
+    return state if since == state.zero_since_ns else replace(state, zero_since_ns=since)
+
+
+def _gather(
+    settings: SafetySettings,
+    state: SafetyState,
+    inp: TickInput,
+    control: ControlState,
+    wanted: BodyTwist,
+    clamped: bool,
+) -> tuple[SafetyState, list[str]]:
+    state, faults = host_checks.check(settings, state, inp)
+    if state.first_ns == 0:
+        state = replace(state, first_ns=inp.now_ns)
+    faults += task_checks.check(inp, control, wanted, state.first_ns)
+    if clamped:
+        faults.append("F36")
+    if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has not spoken is no fault
+        return state, faults
+    for check in (sensor_checks.check, arm_checks.check, base_checks.check):
+        state, found = check(settings, state, inp, control)
+        faults += found
+    return state, faults
+
+
+def _after_pause(state: SafetyState, inp: TickInput, faults: list[str]) -> list[str]:
+    """After skipped ticks: no staleness in this tick, and at most HOLD in the next."""
+    if inp.host.skipped:
+        return [i for i in faults if not i.startswith(STALENESS)]
+    if state.grace_ticks:
+        return [_at_most_hold(i) if i.startswith(STALENESS) else i for i in faults]
+    return faults
+
+
+def _at_most_hold(fault: str) -> str:
+    softer = fault.split("-")[0] + "-hold"
+    return softer if FAULTS[fault].mode > Mode.HOLD and softer in FAULTS else fault
+
+
+def _next_mode(state: SafetyState, asked: Mode, control: ControlState, now_ns: int) -> tuple[Mode, SafetyState]:
+    base = _working_mode(control)
+    current = Mode(state.mode)
+    if asked >= Mode.STOP or current >= Mode.STOP:
+        return max(asked, current), state
+    if asked > Mode.PUSHING and base == Mode.PUSHING:
+        return max(asked, current if current > Mode.PUSHING else asked), replace(state, clean_since_ns=0)
+    if current > Mode.PUSHING and base == Mode.PUSHING:
+        since = state.clean_since_ns or now_ns
+        if now_ns - since < CLEAN_NS:
+            return current, replace(state, clean_since_ns=since)
+        return Mode(current - 1), replace(state, clean_since_ns=since)
+    return base, replace(state, clean_since_ns=0)
+
+
+def _working_mode(control: ControlState) -> Mode:
+    if control.phase == Phase.SETTLE:
+        return Mode.SILENT
+    if control.phase in (Phase.TARE, Phase.DONE, Phase.FAILED):
+        return Mode.READY
+    return Mode.PUSHING
+
+
+def _ending(state: SafetyState, inp: TickInput, control: ControlState) -> tuple[bool, int]:
+    """Return whether the run is over, and its exit code."""
+    if state.mode >= Mode.STOP:
+        code = next((FAULTS[i].exit_code for i in state.latched if FAULTS[i].mode >= Mode.STOP), 5)
+        zero_ns = inp.now_ns - state.stop_since_ns
+        twist = inp.base.odometry
+        # An unknown (NaN) speed compares false: it is not taken for rest.
+        rest = abs(twist.vx) < REST_SPEED_M_PER_S and abs(twist.vy) < REST_SPEED_M_PER_S
+        return (rest and zero_ns >= REST_NS) or zero_ns >= REST_AT_MOST_NS, code
+    if control.phase == Phase.DONE:
+        return True, 0
+    if control.phase == Phase.FAILED:
+        return True, 6
+    return False, 0

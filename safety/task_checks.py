@@ -1,0 +1,36 @@
+"""Does the push itself make sense: start, contact, direction, numbers?"""
+
+from __future__ import annotations
+
+import math
+
+from robot_io.messages import BodyTwist
+from robot_io.tick import ControlState, Phase, TickInput
+
+START_NS = 5_000_000_000
+BACKWARD_TICKS = 20
+RESIDUAL_N = 5.0
+"""The product sheet's own threshold for a force that means something."""
+
+_REFUSALS = {1: "R02", 2: "R03"}
+
+
+def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: int) -> list[str]:
+    """Return the active faults of the task; `first_ns` is when the run began."""
+    faults: list[str] = []
+    phase = control.phase
+    if phase == Phase.SETTLE and inp.now_ns - first_ns > START_NS:
+        faults.append("R01")
+    if phase == Phase.TARE and control.refusal:
+        faults.append(_REFUSALS[control.refusal])
+    if phase in (Phase.LOST, Phase.LOST_HOLD) and control.contact_seen:
+        faults.append("F52")
+    if phase == Phase.LOST_HOLD and not control.contact_seen:
+        faults.append("F53")
+    if control.backward_ticks >= BACKWARD_TICKS:
+        faults.append("F56")
+    if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):
+        faults.append("F58")
+    if control.residual_N > RESIDUAL_N:
+        faults.append("F09")
+    return faults

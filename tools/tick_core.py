@@ -1,0 +1,49 @@
+"""The pure core of a tick, composed: step -> supervise -> envelope. Run by the loop, by level `sim`, by replay."""
+
+from __future__ import annotations
+
+import msgspec
+
+from control.settings import Settings
+from control.step import step
+from robot_io.config import RigConfig
+from robot_io.tick import ControlTick, TickInput, TickOutput, TickState
+from safety import envelope
+from safety.settings import SafetySettings
+from safety.supervisor import note_command, supervise
+
+
+class TickCore(msgspec.Struct, frozen=True):
+    """Settings of control and safety; `fold` runs one tick."""
+
+    control: Settings
+    safety: SafetySettings
+
+    @classmethod
+    def of(cls, rig: RigConfig, *, in_contact: bool = False) -> TickCore:
+        """Resolve the settings of a rig."""
+        return cls(Settings.of(rig, in_contact=in_contact), SafetySettings.of(rig))
+
+    def fold(self, state: TickState, inp: TickInput) -> tuple[TickState, TickOutput]:
+        """Return the state after this tick and what it says. Pure: same arguments, same result, bit for bit."""
+        control, wanted = step(self.control, state.control, inp)
+        clamped = state.envelope.clamped
+        safety, verdict = supervise(self.safety, state.safety, inp, control, wanted.body, clamped)
+        new_envelope, command = envelope.apply(self.safety.envelope, state.envelope, wanted.body, verdict.mode)
+        safety = note_command(safety, command, inp.now_ns)
+        return TickState(control, safety, new_envelope), TickOutput(
+            int(verdict.mode),
+            verdict.faults,
+            wanted.world,
+            wanted.body,
+            command,
+            wanted.contact_x,
+            wanted.contact_y,
+            verdict.finished,
+            verdict.exit_code,
+        )
+
+
+def tick_message(inp: TickInput, before: TickState, after: TickState, output: TickOutput) -> ControlTick:
+    """Return the message for `/control/tick`; the recorder chains it."""
+    return ControlTick(0, 0, inp, before, after, output)
