@@ -73,6 +73,11 @@ class TopicsConfig(Table, frozen=True):
     odometry_type: str = "nav_msgs/Odometry"
     base_pose: str = "/vicon/ThingBase_4/ThingBase_4"
     base_pose_type: str = "geometry_msgs/TransformStamped"
+    joint_states: str = "/ridgeback/joint_states"
+    """Joints named x, y and yaw; used with `pose_source = "joint_states"` only."""
+    joint_states_type: str = "sensor_msgs/JointState"
+    world_frame: str = ""
+    """Frame in which the base pose must come; empty: the frame of the first message, and none other after it."""
     status: str = "/mcu/status"
     status_type: str = "ridgeback_msgs/Status"
     slider_pose: str = ""
@@ -132,6 +137,8 @@ class ControlConfig(Table, frozen=True):
     lost_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=1)] = 0.2
     lost_time_s: Annotated[float, Meta(gt=0, le=10)] = 3.0
     lost_distance_m: Annotated[float, Meta(gt=0, le=2)] = 0.3
+    retreat_m: Annotated[float, Meta(ge=0, le=0.2)] = 0.05
+    """How far the base backs off after the push, so that the sensor can be checked out of contact (0: not at all)."""
     lost_rest_s: Annotated[float, Meta(gt=0, le=60)] = 2.0
 
 
