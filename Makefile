@@ -1,0 +1,34 @@
+# `make demo` and `make test` set everything up by themselves, in .venv; nothing else is touched.
+PYTHON ?= python3
+BIN := .venv/bin
+DEMO := runs/demo-$(shell date +%Y%m%d-%H%M%S)
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-all check clean runtime dev
+
+help: ## list the targets
+	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' Makefile
+
+demo: runtime ## set up, push a box 2 m with the real drivers over wire emulators, replay it bit for bit
+	$(BIN)/push run emulated --distance-m 2 --out $(DEMO)
+	$(BIN)/push replay $(DEMO)/run.mcap
+
+test: check ## set up, check style, types and import rules, run all tests but the long ones
+	$(BIN)/python -m pytest -q
+
+test-all: check ## the same with the long tests
+	$(BIN)/python -m pytest -q -m 'not hardware'
+
+check: dev ## ruff, mypy strict and the import contracts, no tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+clean: ## remove the environment and all caches (runs/ stays)
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+runtime dev:
+	@command -v $(PYTHON) >/dev/null || { echo "set-up: no $(PYTHON) here: run \`sudo apt install python3 python3-venv\`" >&2; exit 2; }
+	@$(PYTHON) tools/bootstrap.py $@

@@ -1,0 +1,129 @@
+"""Makes the one `.venv` of this checkout: `python3 tools/bootstrap.py runtime|dev`, called by every make target.
+
+It uses only the standard library, and nothing newer than Python 3.7, so that an old Python gets a sentence and
+not a syntax error. It works where the system's pip is externally managed, and with only python3-venv or
+only python3-pip present. A stamp in `.venv` names what was installed from which files: nothing is done twice.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+EXTRAS = {"runtime": "", "dev": "[dev,sweep,cluster]"}
+OLDEST = (3, 11)
+WHEELS_BELOW = (3, 13)
+"""ur_rtde comes ready-built for Pythons below this one; for newer ones it is compiled (needs cmake and boost)."""
+APT_VENV = "sudo apt install python3-venv"
+APT_BUILD = "sudo apt install cmake g++ libboost-all-dev python3-dev"
+
+
+class SetUpError(Exception):
+    """Set-up cannot go on; the text is the one sentence that helps."""
+
+
+def run(*command: str, quiet: bool = True) -> bool:
+    """Run `command`; return whether it succeeded. `quiet` drops its output, which then only shows expected failures."""
+    sink = subprocess.DEVNULL if quiet else None
+    return subprocess.run(command, stdout=sink, stderr=sink, stdin=subprocess.DEVNULL, check=False).returncode == 0
+
+
+def digest_of_inputs() -> str:
+    """Return a digest of the two files that say what to install."""
+    digest = hashlib.sha256()
+    for name in ("pyproject.toml", "constraints.txt"):
+        digest.update((ROOT / name).read_bytes())
+    return digest.hexdigest()
+
+
+def choose_python() -> str:
+    """Return the interpreter to use: this one, or an older one beside it when this one is too new for the wheels."""
+    if sys.version_info[:2] < OLDEST:
+        this = ".".join(map(str, sys.version_info[:2]))
+        raise SetUpError(
+            f"Python {OLDEST[0]}.{OLDEST[1]} or newer is needed and {sys.executable} is {this}: "
+            "install a newer one and name it, for example `make PYTHON=python3.12 demo`"
+        )
+    if sys.version_info[:2] >= WHEELS_BELOW:
+        for name in ("python3.12", "python3.11"):
+            other = shutil.which(name)
+            if other and run(other, "-c", "import venv"):
+                return other
+    return sys.executable
+
+
+def make_venv(python: str, venv: Path) -> list[str]:
+    """Make `venv` and return the command that installs with pip into it."""
+    inside = [str(venv / "bin" / "python"), "-m", "pip"]
+    if (venv / "bin" / "uv").exists() or run(*inside, "--version"):
+        return inside  # it is there already
+    shutil.rmtree(venv, ignore_errors=True)
+    if run(python, "-m", "venv", str(venv)) and run(*inside, "--version"):
+        return inside
+    # Without python3-venv there is no pip to put in, but a system pip can install into another environment.
+    shutil.rmtree(venv, ignore_errors=True)
+    outside = [python, "-m", "pip", "--python", str(venv / "bin" / "python")]
+    if run(python, "-m", "venv", "--without-pip", str(venv)) and run(*outside, "--version"):
+        return outside
+    shutil.rmtree(venv, ignore_errors=True)
+    raise SetUpError(f"this Python can make no environment with pip: run `{APT_VENV}`, then try again")
+
+
+def install(kind: str, pip: list[str], venv: Path) -> None:
+    """Install the program with the pinned versions, with uv if it can be had, else with pip."""
+    uv = str(venv / "bin" / "uv")
+    wanted = ["-c", str(ROOT / "constraints.txt"), "-e", f"{ROOT}{EXTRAS[kind]}"]
+    if Path(uv).exists() or run(*pip, "install", "-q", "--disable-pip-version-check", "uv"):
+        done = run(uv, "pip", "install", "-q", "--python", str(venv / "bin" / "python"), *wanted, quiet=False)
+    else:
+        done = run(*pip, "install", "-q", "--disable-pip-version-check", *wanted, quiet=False)
+    if not done:
+        hint = f" If a package had to be compiled: `{APT_BUILD}`." if sys.version_info[:2] >= WHEELS_BELOW else ""
+        raise SetUpError(f"installing failed, for the reason above. Is a package index reachable?{hint}")
+
+
+def set_up(kind: str, venv: Path) -> None:
+    """Bring `venv` to hold what `kind` (runtime or dev) needs; at once when its stamp says it does."""
+    python = choose_python()
+    digest = digest_of_inputs()
+    home = f"{python} in {ROOT}"
+    stamp = venv / ".installed"
+    installed, for_digest, at_home = (stamp.read_text(encoding="utf-8").splitlines() if stamp.is_file() else [""] * 3)[
+        :3
+    ]
+    if at_home == home and for_digest == digest and installed in ("dev", kind):  # dev holds all of runtime
+        return
+    print(f"setting up {venv.name} ({kind}) with {python}: about half a minute the first time", flush=True)
+    if at_home not in ("", home):  # another Python, or the folder was moved: its scripts would not start
+        shutil.rmtree(venv)
+    pip = make_venv(python, venv)
+    if stamp.is_file():
+        stamp.unlink()
+    # What `make test` once installed stays installed when `make demo` follows a change.
+    kind = "dev" if installed == "dev" else kind
+    install(kind, pip, venv)
+    stamp.write_text(f"{kind}\n{digest}\n{home}\n", encoding="utf-8")
+
+
+def main() -> int:
+    """Set up for `runtime` or `dev`; return 0, or 2 with a sentence."""
+    os.environ.pop("VIRTUAL_ENV", None)  # an active environment of the caller's is not ours to fill
+    # One set-up at a time: two make calls in two terminals wait for each other.
+    with (ROOT / "pyproject.toml").open("rb") as guard:
+        fcntl.flock(guard, fcntl.LOCK_EX)
+        try:
+            set_up(sys.argv[1] if len(sys.argv) > 1 else "runtime", ROOT / ".venv")
+        except SetUpError as error:
+            print(f"set-up: {error}", file=sys.stderr)
+            return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
