@@ -29,9 +29,13 @@ class SetUpError(Exception):
 
 
 def run(*command: str, quiet: bool = True) -> bool:
-    """Run `command`; return whether it succeeded. `quiet` drops its output, which then only shows expected failures."""
+    """Run `command`; return whether it succeeded. `quiet` is for commands that are expected to fail somewhere."""
     sink = subprocess.DEVNULL if quiet else None
-    return subprocess.run(command, stdout=sink, stderr=sink, stdin=subprocess.DEVNULL, check=False).returncode == 0
+    try:
+        done = subprocess.run(command, stdout=sink, stderr=sink, stdin=subprocess.DEVNULL, check=False)
+    except OSError:  # no such program
+        return False
+    return done.returncode == 0
 
 
 def digest_of_inputs() -> str:
