@@ -1,0 +1,84 @@
+"""Makes a whole log of what is left of a truncated one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.writer import Writer
+
+from robot_io.errors import LogDamaged, UsageError
+from robot_io.mcap_log import LIBRARY, create_new, finish_writer, flush_writer, start_writer
+from robot_io.mcap_walk import LogItem, walk
+
+RECOVERED_METADATA = "recovered"
+
+
+class Recovered(NamedTuple):
+    """What was saved, and what was wrong with the source."""
+
+    messages: int
+    cause: str
+
+
+def recover(path: Path, out_path: Path) -> Recovered:
+    """Copy everything before the first damage of `path` into a new, finished log.
+
+    Raises UsageError when `out_path` exists or `path` is whole, LogDamaged when nothing can be saved.
+    """
+    if out_path.exists():
+        raise UsageError("there is already a file of this name", where=str(out_path), do="Give another name with --out")
+    items = walk(path, finished=False)
+    first = next(items)  # nothing is created for a file that is no log
+    stream = create_new(out_path)
+    try:
+        copy = _Copy(start_writer(stream, LIBRARY))
+        cause = ""
+        try:
+            copy.take(first)
+            for item in items:
+                copy.take(item)
+        except LogDamaged as damage:
+            cause = damage.what
+        if not cause:
+            raise UsageError("the log is whole, there is nothing to recover", where=str(path))
+        if copy.messages == 0:
+            raise LogDamaged(f"no message can be saved: {cause}", where=str(path))
+        flush_writer(copy.writer)
+        facts = {"source": path.name, "messages": str(copy.messages), "cause": cause}
+        copy.writer.add_metadata(RECOVERED_METADATA, facts)
+        finish_writer(copy.writer, stream)
+    except BaseException:
+        stream.close()
+        out_path.unlink()
+        raise
+    return Recovered(copy.messages, cause)
+
+
+class _Copy:
+    """The records written so far, under their new numbers."""
+
+    def __init__(self, writer: Writer) -> None:
+        self.writer = writer
+        self.messages = 0
+        self._schemas: dict[int, int] = {}
+        self._channels: dict[int, int] = {}
+
+    def take(self, item: LogItem) -> None:
+        """Append one record."""
+        if isinstance(item, Message):
+            channel_id = self._channels[item.channel_id]
+            self.writer.add_message(channel_id, item.log_time, item.data, item.publish_time, item.sequence)
+            self.messages += 1
+        elif isinstance(item, Schema):
+            self._schemas[item.id] = self.writer.register_schema(item.name, item.encoding, item.data)
+        elif isinstance(item, Channel):
+            schema_id = self._schemas[item.schema_id]
+            self._channels[item.id] = self.writer.register_channel(
+                item.topic, item.message_encoding, schema_id, item.metadata
+            )
+        elif isinstance(item, Attachment):
+            self.writer.add_attachment(item.create_time, item.log_time, item.name, item.media_type, item.data)
+        elif isinstance(item, Metadata):
+            self.writer.add_metadata(item.name, item.metadata)
