@@ -1,0 +1,148 @@
+"""Set-up on machines that lack one thing or another, played by a `python` that refuses some of its jobs."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tools import bootstrap
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def python_that_refuses(folder: Path, *refusals: str) -> str:
+    """Write an interpreter that fails when its arguments, joined by spaces, match one of the shell patterns."""
+    cases = "".join(f"  {pattern.replace(' ', chr(92) + ' ')}) exit 1 ;;\n" for pattern in refusals)
+    path = folder / "python3"
+    path.write_text(f'#!/bin/sh\ncase "$*" in\n{cases}esac\nexec {sys.executable} "$@"\n', encoding="utf-8")
+    path.chmod(0o755)
+    return str(path)
+
+
+NO_VENV_PACKAGE = "-m venv [!-]*"  # Debian without python3-venv: only --without-pip works
+NO_PIP_PACKAGE = "-m pip*"
+
+
+def test_only_pip_present_installs_from_outside(tmp_path):
+    python = python_that_refuses(tmp_path, NO_VENV_PACKAGE)
+    venv = tmp_path / "env"
+    pip = bootstrap.make_venv(python, venv)
+    assert pip == [python, "-m", "pip", "--python", str(venv / "bin" / "python")]
+    listed = subprocess.run([*pip, "list"], capture_output=True, text=True, timeout=60, check=True)
+    assert "pytest" not in listed.stdout  # it looks into the new environment, not into this one
+    assert not (venv / "bin" / "pip").exists()
+
+
+def test_only_venv_present_uses_the_pip_inside(tmp_path):
+    python = python_that_refuses(tmp_path, NO_PIP_PACKAGE)
+    venv = tmp_path / "env"
+    assert bootstrap.make_venv(python, venv) == [str(venv / "bin" / "python"), "-m", "pip"]
+    assert bootstrap.make_venv("/no/such/python", venv) == [str(venv / "bin" / "python"), "-m", "pip"]  # kept
+
+
+def test_neither_present_names_the_one_line_that_helps(tmp_path):
+    python = python_that_refuses(tmp_path, NO_VENV_PACKAGE, NO_PIP_PACKAGE)
+    with pytest.raises(bootstrap.SetUpError, match="sudo apt install python3-venv"):
+        bootstrap.make_venv(python, tmp_path / "env")
+    assert not (tmp_path / "env").exists()
+
+
+def test_old_python_gets_a_sentence(monkeypatch):
+    monkeypatch.setattr(sys, "version_info", (3, 9, 2, "final", 0))
+    with pytest.raises(bootstrap.SetUpError, match=r"Python 3\.11 or newer is needed and .* is 3\.9"):
+        bootstrap.choose_python()
+
+
+def test_newer_python_gives_way_to_one_the_wheels_are_made_for(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "version_info", (3, 14, 0, "final", 0))
+    older = tmp_path / "python3.12"
+    older.symlink_to(python_that_refuses(tmp_path))
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    assert bootstrap.choose_python() == str(older)
+
+
+@pytest.fixture
+def recorded(monkeypatch, tmp_path):
+    """Set-up whose commands are recorded instead of run; uv is there when asked for by name."""
+    commands = []
+
+    def record(*command, quiet=True):
+        commands.append(list(command))
+        return not (record.no_uv and command[-1] == "uv")
+
+    record.no_uv = False
+    monkeypatch.setattr(bootstrap, "run", record)
+    return record, commands
+
+
+def test_stamp_guards_against_doing_it_twice(recorded, tmp_path):
+    _, commands = recorded
+    venv = tmp_path / ".venv"
+    venv.mkdir()
+    bootstrap.set_up("runtime", venv)
+    assert commands[-1][-1] == str(ROOT)
+    assert "-c" in commands[-1]
+    commands.clear()
+    bootstrap.set_up("runtime", venv)
+    assert commands == []
+    bootstrap.set_up("dev", venv)
+    assert commands[-1][-1].endswith("[dev,sweep,cluster]")
+    commands.clear()
+    bootstrap.set_up("runtime", venv)  # dev holds it already
+    assert commands == []
+
+
+def test_stamp_of_other_pins_python_or_folder_does_not_count(recorded, tmp_path):
+    _, commands = recorded
+    venv = tmp_path / ".venv"
+    venv.mkdir()
+    bootstrap.set_up("dev", venv)
+    kind, digest, home = (venv / ".installed").read_text(encoding="utf-8").splitlines()
+    for changed, kept in ((f"{kind}\nother\n{home}\n", True), (f"{kind}\n{digest}\nelsewhere\n", False)):
+        (venv / "marker").touch()
+        (venv / ".installed").write_text(changed, encoding="utf-8")
+        commands.clear()
+        try:
+            bootstrap.set_up("runtime", venv)
+        except FileNotFoundError:  # the recorded commands make no folder anew
+            assert not kept
+        assert commands[-1][-1].endswith("[dev,sweep,cluster]")
+        assert (venv / "marker").exists() == kept
+
+
+def test_without_uv_plain_pip_installs(recorded, tmp_path):
+    record, commands = recorded
+    record.no_uv = True
+    venv = tmp_path / ".venv"
+    venv.mkdir()
+    bootstrap.set_up("runtime", venv)
+    assert commands[-1][:3] == [str(venv / "bin" / "python"), "-m", "pip"]
+    assert commands[-1][-1] == str(ROOT)
+
+
+def test_constraints_name_versions_and_no_hosts():
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    assert len(lines) > 40
+    assert all("==" in line and "://" not in line and " @ " not in line for line in lines)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_fresh_clone_sets_itself_up(tmp_path):
+    clone = tmp_path / "a clone"
+    subprocess.run(["git", "clone", "-q", str(ROOT), str(clone)], check=True, timeout=60)
+    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    for goal in ("runtime", "dev"):
+        done = subprocess.run(
+            ["make", goal], cwd=clone, env=environment, capture_output=True, text=True, timeout=500, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "setting up" in done.stdout
+    again = subprocess.run(
+        ["make", "dev"], cwd=clone, env=environment, capture_output=True, text=True, timeout=60, check=True
+    )
+    assert again.stdout == ""
+    push = [str(clone / ".venv" / "bin" / "push"), "config", "check", "sim"]
+    assert subprocess.run(push, cwd=tmp_path, env=environment, timeout=60, check=False).returncode == 0
