@@ -7,18 +7,18 @@ outside, BODY frame of the slider inside; floats only, so that the same steps gi
 
 from __future__ import annotations
 
-from enum import IntEnum
 from math import ceil, cos, hypot, pi, remainder, sin
 from typing import Literal
-
-import msgspec
 
 from robot_io.errors import ConfigError
 from robot_io.messages import Pose2D
 from sim_backend.contact_geometry import Nearest, Outline
+from sim_backend.contact_outcome import FREE, ContactMode, ContactOutcome
 from sim_backend.corner import solve_at_corner
 from sim_backend.slider import SliderModel
-from sim_backend.slider_exact import ContactSolver, Moving, solve_exact
+from sim_backend.slider_exact import ContactSolution, ContactSolver, Moving, solve_exact
+
+__all__ = ["FREE", "ContactMode", "ContactOutcome", "PushedSlider"]
 
 TOUCH_M = 1e-9
 """A gap below this is contact."""
@@ -29,38 +29,6 @@ REST_M_PER_S = 1e-9
 """Below this speed the ball counts as at rest and the force is held."""
 SMALLEST_BALL_M = 1e-3
 """A ball is a point (0) or at least this: a smaller one would turn round a corner within a piece."""
-
-
-class ContactMode(IntEnum):
-    """What the contact does; left and right as seen along the inward normal."""
-
-    STICKING = 0
-    SLIDING_LEFT = 1
-    SLIDING_RIGHT = 2
-    FREE = 3
-    """No contact, or none that needs a force."""
-    HOLDING = 4
-    """Ball at rest in contact: the last force stays."""
-
-
-class ContactOutcome(msgspec.Struct, frozen=True, gc=False):
-    """One step's answer, WORLD frame: force on the slider (N), and where it acts (m) along which inward normal."""
-
-    mode: ContactMode
-    force_x: float = 0.0
-    force_y: float = 0.0
-    contact_x: float = 0.0
-    contact_y: float = 0.0
-    normal_x: float = 0.0
-    normal_y: float = 0.0
-
-    @property
-    def in_contact(self) -> bool:
-        """Whether ball and slider touch; the contact point and the normal are meaningful only then."""
-        return self.mode is not ContactMode.FREE
-
-
-FREE = ContactOutcome(ContactMode.FREE)
 _MODES = (ContactMode.STICKING, ContactMode.SLIDING_LEFT, ContactMode.SLIDING_RIGHT)
 
 
@@ -164,6 +132,7 @@ class PushedSlider:
                 if choice is None:
                     self._touching, self._corner = False, -1
                     return FREE
+                solution: ContactSolution
                 solution, self._nx, self._ny, self._face = choice
                 if self._face >= 0:
                     self._corner = -1
@@ -212,8 +181,10 @@ class PushedSlider:
     def _take_contact(self, nearest: Nearest) -> None:
         _, self._nx, self._ny, self._cx, self._cy, self._face = nearest
         self._corner = -1
-        if self._point_on_polygon and self._face < 0:
-            self._corner = next(i for i, row in enumerate(self._outline.rows) if row[7:] == (self._cx, self._cy))
+        if self._point_on_polygon:
+            for corner, row in enumerate(self._outline.rows):
+                if hypot(row[7] - self._cx, row[8] - self._cy) < TOUCH_M:
+                    self._corner, self._cx, self._cy = corner, row[7], row[8]
 
     def _move(self, solution: Moving, dt_s: float) -> None:
         """Turn and shift the slider by its twist about the centre of friction."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import hypot
 
 from sim_backend.contact_geometry import FaceRow
-from sim_backend.slider_exact import TINY, ContactSolution, ContactSolver, Moving, Sliding
+from sim_backend.slider_exact import TINY, ContactSolver, Moving, Sliding
 
-CornerChoice = tuple[ContactSolution, float, float, int]
+CornerChoice = tuple[Moving, float, float, int]
 """The motion, the inward normal x, y (BODY) it was found for, and the face it goes on along (-1: the corner)."""
 
 
@@ -21,19 +21,27 @@ def solve_at_corner(
 ) -> CornerChoice | None:
     """Return how a slider answers a point pusher at corner `corner` (m/s, BODY), or None if the pusher clears it.
 
+    Any normal between the two faces' is possible at the corner, so the program's aim, the least slip, is met by
+    sticking there if that is feasible, and else by the face along which the contact slides away from the corner.
     Corner i is the high end of face i and the low end of the face before it. `arguments`: contact minus centre of
     friction x, y, d_m, f_max_N, contact friction.
     """
     before = (corner - 1) % len(rows)
     if min(_closing(rows[corner], vx, vy), _closing(rows[before], vx, vy)) <= 0.0:
         return None  # outside one face's line is outside the slider
+    stuck = _stick(rows[corner], rows[before], vx, vy, arguments)
+    if stuck is not None:
+        return stuck
     cx, cy, d, f_max, mu = arguments
-    on = {face: solve(cx, cy, rows[face][0], rows[face][1], vx, vy, d, f_max, mu) for face in (corner, before)}
-    for face, inward in ((corner, Sliding.RIGHT), (before, Sliding.LEFT)):
-        solution = on[face]
-        if isinstance(solution, Moving) and solution.mode in (Sliding.STICKING, inward):
-            return (solution, rows[face][0], rows[face][1], face)
-    return _stick(rows[corner], rows[before], vx, vy, arguments)
+    inward: list[tuple[Moving, int]] = []
+    for face, sliding in ((corner, Sliding.RIGHT), (before, Sliding.LEFT)):
+        solution = solve(cx, cy, rows[face][0], rows[face][1], vx, vy, d, f_max, mu)
+        if isinstance(solution, Moving) and solution.mode is sliding:
+            inward.append((solution, face))
+    if not inward:
+        return None
+    least, face = min(inward, key=lambda found: abs(found[0].slip))
+    return (least, rows[face][0], rows[face][1], face)
 
 
 def _closing(row: FaceRow, vx: float, vy: float) -> float:

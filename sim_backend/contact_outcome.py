@@ -1,0 +1,39 @@
+"""What one step of a ball against a slider comes to."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import msgspec
+
+
+class ContactMode(IntEnum):
+    """What the contact does; left and right as seen along the inward normal."""
+
+    STICKING = 0
+    SLIDING_LEFT = 1
+    SLIDING_RIGHT = 2
+    FREE = 3
+    """No contact, or none that needs a force."""
+    HOLDING = 4
+    """Ball at rest in contact: the last force stays."""
+
+
+class ContactOutcome(msgspec.Struct, frozen=True, gc=False):
+    """One step's answer, WORLD frame: force on the slider (N), and where it acts (m) along which inward normal."""
+
+    mode: ContactMode
+    force_x: float = 0.0
+    force_y: float = 0.0
+    contact_x: float = 0.0
+    contact_y: float = 0.0
+    normal_x: float = 0.0
+    normal_y: float = 0.0
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether ball and slider touch; the contact point and the normal are meaningful only then."""
+        return self.mode is not ContactMode.FREE
+
+
+FREE = ContactOutcome(ContactMode.FREE)
