@@ -1,0 +1,233 @@
+"""One websocket connection without a thread and without blocking: the Sans-I/O client of `websockets` on a socket.
+
+Made for commands to a robot: a message leaves whole and now, or the link counts as lost. Nothing queues in
+front of it, nothing is resumed, and a lost link is reset (SO_LINGER 0), so that the kernel does not deliver
+the rest later. Only `connect` waits, bounded.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import struct
+
+from websockets.client import ClientProtocol
+from websockets.exceptions import InvalidHandshake, InvalidMessage, InvalidURI
+from websockets.frames import Frame, Opcode
+from websockets.http11 import Response
+from websockets.protocol import State
+from websockets.uri import WebSocketURI, parse_uri
+
+from robot_io.clock import NS_PER_S, ClockNs, monotonic_ns
+from robot_io.errors import ConfigError, DeviceError, DeviceProtocolError, DeviceUnreachable
+
+CONNECT_TIMEOUT_S = 1.0
+HANDSHAKE_TIMEOUT_S = 1.0
+CLOSE_TIMEOUT_S = 0.05
+SEND_BUFFER_BYTES = 16_384
+"""Small: what does not fit into it is old before it arrives."""
+
+_RECEIVE_BYTES = 65_536
+_RECEIVES_PER_CALL = 16
+_RESET_ON_CLOSE = struct.pack("ii", 1, 0)
+_START_THE_BRIDGE = "Start rosbridge on the robot (roslaunch rosbridge_server rosbridge_websocket.launch)"
+
+
+class LinkLost(Exception):
+    """The connection is gone or must be given up; the message is the cause."""
+
+
+def parse_url(url: str) -> WebSocketURI:
+    """Return the parts of `ws://host:port/`. Raises ConfigError for anything else."""
+    try:
+        uri = parse_uri(url)
+    except (InvalidURI, ValueError) as error:
+        raise ConfigError(
+            f"{url!r} is no websocket address", where="base url", do="Write it as ws://192.168.131.1:9090"
+        ) from error
+    if uri.secure:
+        raise ConfigError("encrypted websockets (wss) are not supported", where=url, do="Use ws://")
+    return uri
+
+
+class WebSocketLink:
+    """A connected websocket; every method returns at once except `connect` (2 s) and `close` (0.05 s)."""
+
+    def __init__(self, uri: WebSocketURI, sock: socket.socket, protocol: ClientProtocol, clock: ClockNs) -> None:
+        self._uri = uri
+        self._socket = sock
+        self._protocol = protocol
+        self._clock = clock
+        self._parts: list[bytes] | None = None
+        self._lost: LinkLost | None = None
+        self.newest_pong_ns = 0
+        """When the server last answered a ping; 0 before the first answer."""
+        self.server = ""
+        """What the server calls itself."""
+
+    @classmethod
+    def connect(cls, url: str, clock: ClockNs = monotonic_ns) -> WebSocketLink:
+        """Connect and shake hands. Raises ConfigError, DeviceUnreachable or DeviceProtocolError."""
+        uri = parse_url(url)
+        try:
+            sock = socket.create_connection((uri.host, uri.port), timeout=CONNECT_TIMEOUT_S)
+        except TimeoutError as error:
+            raise DeviceUnreachable(
+                f"no answer within {CONNECT_TIMEOUT_S:g} s",
+                where=url,
+                do="Check cable, address and that the base is on",
+            ) from error
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise DeviceUnreachable(f"cannot connect ({why})", where=url, do=_START_THE_BRIDGE) from error
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+        link = cls(uri, sock, ClientProtocol(uri), clock)
+        try:
+            link._shake_hands(url)
+        except BaseException:
+            sock.close()
+            raise
+        return link
+
+    def fileno(self) -> int:
+        """Return the socket's descriptor."""
+        return self._socket.fileno()
+
+    def receive(self) -> list[tuple[bytes, int]]:
+        """Return the texts that have arrived, each with its arrival time (ns); pings are answered on the way.
+
+        Raises LinkLost on EOF, error or a broken frame, after everything that came before it was returned.
+        """
+        texts: list[tuple[bytes, int]] = []
+        try:
+            if self._lost is not None:
+                raise self._lost
+            for _ in range(_RECEIVES_PER_CALL):
+                if not self._receive_once(texts):
+                    break
+        except LinkLost as lost:
+            if not texts:
+                raise
+            self._lost = lost
+        return texts
+
+    def send_text(self, payload: bytes) -> None:
+        """Send one text message whole and now. Raises LinkLost when the socket does not take all of it."""
+        self._protocol.send_text(payload)
+        self._flush()
+
+    def send_ping(self, payload: bytes) -> None:
+        """Send a ping; `newest_pong_ns` tells when it was answered. Raises LinkLost like `send_text`."""
+        self._protocol.send_ping(payload)
+        self._flush()
+
+    def wait_readable(self, until_ns: int) -> bool:
+        """Wait until something arrives or `until_ns` has passed; tell which."""
+        return self._wait(select.POLLIN, until_ns)
+
+    def abort(self) -> None:
+        """Drop the connection with a reset, so that nothing of it is delivered later; never raises."""
+        with contextlib.suppress(OSError):
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET_ON_CLOSE)
+        self._socket.close()
+
+    def close(self) -> None:
+        """Say goodbye and close; waits at most CLOSE_TIMEOUT_S for the server's goodbye; never raises."""
+        with contextlib.suppress(OSError, LinkLost):
+            if self._protocol.state is State.OPEN:
+                self._protocol.send_close(1000)
+                self._flush()
+                self._socket.shutdown(socket.SHUT_WR)
+                until_ns = self._clock() + int(CLOSE_TIMEOUT_S * NS_PER_S)
+                while self.wait_readable(until_ns) and self._socket.recv(_RECEIVE_BYTES):
+                    pass
+        self._socket.close()
+
+    def _shake_hands(self, url: str) -> None:
+        self._protocol.send_request(self._protocol.connect())
+        until_ns = self._clock() + int(HANDSHAKE_TIMEOUT_S * NS_PER_S)
+        try:
+            self._flush()
+            while self._protocol.state is State.CONNECTING and self._protocol.handshake_exc is None:
+                if not self.wait_readable(until_ns):
+                    raise DeviceUnreachable(
+                        f"accepts connections but gave no websocket handshake within {HANDSHAKE_TIMEOUT_S:g} s",
+                        where=url,
+                        do="The bridge hangs, or something else listens there; restart rosbridge",
+                    )
+                data = self._socket.recv(_RECEIVE_BYTES)
+                if data:
+                    self._protocol.receive_data(data)
+                else:
+                    self._protocol.receive_eof()
+        except (OSError, LinkLost) as error:
+            raise DeviceUnreachable(
+                f"connection lost during the handshake ({error})", where=url, do=_START_THE_BRIDGE
+            ) from error
+        if self._protocol.handshake_exc is not None:
+            raise _not_a_bridge(url, self._protocol.handshake_exc) from self._protocol.handshake_exc
+        response = self._protocol.events_received()[0]
+        if isinstance(response, Response):
+            self.server = response.headers.get("Server", "")
+
+    def _receive_once(self, texts: list[tuple[bytes, int]]) -> bool:
+        try:
+            data = self._socket.recv(_RECEIVE_BYTES)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise LinkLost(f"connection lost ({error.strerror or error})") from error
+        now_ns = self._clock()
+        # Acknowledge at once, or the server's Nagle algorithm holds its next message back for up to 40 ms.
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+        if not data:
+            raise LinkLost("connection closed by the bridge")
+        self._protocol.receive_data(data)
+        self._collect(texts, now_ns)
+        self._flush()
+        if self._protocol.state is not State.OPEN:
+            raise LinkLost(f"connection closed by the bridge ({self._protocol.close_exc})")
+        return True
+
+    def _collect(self, texts: list[tuple[bytes, int]], now_ns: int) -> None:
+        for event in self._protocol.events_received():
+            if not isinstance(event, Frame):
+                continue
+            if event.opcode is Opcode.PONG:
+                self.newest_pong_ns = now_ns
+            elif event.opcode is Opcode.TEXT and event.fin:
+                texts.append((bytes(event.data), now_ns))
+            elif event.opcode in (Opcode.TEXT, Opcode.BINARY):
+                self._parts = [bytes(event.data)] if event.opcode is Opcode.TEXT else None
+            elif event.opcode is Opcode.CONT and self._parts is not None:
+                self._parts.append(bytes(event.data))
+                if event.fin:
+                    texts.append((b"".join(self._parts), now_ns))
+                    self._parts = None
+
+    def _flush(self) -> None:
+        data = b"".join(self._protocol.data_to_send())
+        if not data:
+            return
+        try:
+            sent = self._socket.send(data)
+        except BlockingIOError as error:
+            raise LinkLost("the socket takes no more data: the bridge does not read") from error
+        except OSError as error:
+            raise LinkLost(f"sending failed ({error.strerror or error})") from error
+        if sent != len(data):
+            raise LinkLost("only part of a message could be sent: the bridge does not read")
+
+    def _wait(self, events: int, until_ns: int) -> bool:
+        poll = select.poll()
+        poll.register(self._socket, events)
+        return bool(poll.poll(max(0, until_ns - self._clock()) // 1_000_000))
+
+
+def _not_a_bridge(url: str, error: Exception) -> DeviceError:
+    detail = str(error) if isinstance(error, InvalidHandshake) and not isinstance(error, InvalidMessage) else ""
+    what = "what listens there is no websocket server" + (f" ({detail})" if detail else "")
+    return DeviceProtocolError(what, where=url, do="Check the port; rosbridge listens on 9090 by default")
