@@ -1,0 +1,82 @@
+"""How fast bytes travel between a host and an FT 300: the line's speed and the USB adapter's latency timer. Pure.
+
+19200 baud with ten bits a byte carries 1920 bytes a second in each direction. An FTDI adapter hands received
+bytes to the host only when its latency timer fires (1 or 16 ms; 0 here stands for "at once"), whatever packets
+they belong to. Not modelled: the adapter's 64-byte buffer (a period of 16 ms never fills it), USB frames,
+framing errors.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from robot_io.clock import NS_PER_MS, NS_PER_S
+
+BYTES_PER_S = 1920
+QUEUE_LIMIT = 4096
+
+
+class WireDirection:
+    """One direction of the line: bytes go in at once and arrive one by one, at the line's speed."""
+
+    def __init__(self, *, paced: bool) -> None:
+        self._byte_ns = NS_PER_S // BYTES_PER_S if paced else 0
+        self._queue: deque[tuple[int, int]] = deque()
+        self._free_ns = 0
+
+    def __len__(self) -> int:
+        """Return the number of bytes that have not been taken yet."""
+        return len(self._queue)
+
+    @property
+    def free_ns(self) -> int:
+        """When the last byte put in will have arrived."""
+        return self._free_ns
+
+    @property
+    def room(self) -> int:
+        """How many bytes it takes before it is full."""
+        return QUEUE_LIMIT - len(self._queue)
+
+    def is_busy(self, at_ns: int) -> bool:
+        """Return whether bytes are on the wire at `at_ns`."""
+        return at_ns < self._free_ns
+
+    def put(self, data: bytes, at_ns: int) -> bool:
+        """Put bytes on the wire at `at_ns`, behind those still on it; False (none taken) when the queue is full."""
+        if len(self._queue) + len(data) > QUEUE_LIMIT:
+            return False
+        arrival_ns = max(at_ns, self._free_ns)
+        for byte in data:
+            arrival_ns += self._byte_ns
+            self._queue.append((arrival_ns, byte))
+        self._free_ns = arrival_ns
+        return True
+
+    def next_ns(self) -> int | None:
+        """Return when the next byte arrives; None when nothing is under way."""
+        return self._queue[0][0] if self._queue else None
+
+    def next_began_ns(self) -> int | None:
+        """Return when the next byte began to travel; None when nothing is under way."""
+        return self._queue[0][0] - self._byte_ns if self._queue else None
+
+    def take(self, until_ns: int) -> bytes:
+        """Return the bytes that have arrived by `until_ns`."""
+        taken = bytearray()
+        while self._queue and self._queue[0][0] <= until_ns:
+            taken.append(self._queue.popleft()[1])
+        return bytes(taken)
+
+    def clear(self) -> None:
+        """Lose what is under way."""
+        self._queue.clear()
+        self._free_ns = 0
+
+
+def next_delivery_ns(arrival_ns: int, latency_ms: int) -> int:
+    """Return when a byte that reached the adapter at `arrival_ns` is handed to the host."""
+    if latency_ms == 0:
+        return arrival_ns
+    timer_ns = latency_ms * NS_PER_MS
+    return -(-arrival_ns // timer_ns) * timer_ns

@@ -1,0 +1,134 @@
+"""An FT 300 emulator in a process of its own, for tests; also the program of that process.
+
+    with ft300_process(latency_ms=16, knobs={"ack": False}) as emulator:
+        Ft300(emulator.port)
+        emulator.ask("stall", 0.2)
+
+Commands and answers are one JSON line each; the process ends when its stdin does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from robot_io.event_loop import EventLoop
+from sim_backend.ft300_emulator import Ft300Emulator
+from sim_backend.ft300_knobs import Ft300Knobs
+from sim_backend.ft300_standalone import ConstantWrench
+
+ROOT = Path(__file__).parents[2]
+START_LIMIT_S = 20.0
+
+WRENCH = (12.34, -56.78, 100.0, 0.1, -1.23, 3.21)
+
+
+class Ramp:
+    """A source whose Fx counts samples (0.01 N each, modulo 200 N), so that every packet tells its place."""
+
+    def __init__(self) -> None:
+        self.reads = 0
+
+    def read_ft(self, t_ns: int) -> tuple[float, float, float, float, float, float]:
+        self.reads += 1
+        return (self.reads % 20000) / 100, -56.78, 100.0, 0.1, -1.23, 3.21
+
+
+class EmulatorProcess:
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+        self.pid = process.pid
+        self.port = str(self._answer()["port"])
+
+    def ask(self, command: str, *args: Any) -> dict[str, Any]:
+        """Send a command; return its answer."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps([command, *args]) + "\n")
+        self._process.stdin.flush()
+        return self._answer()
+
+    def counters(self) -> dict[str, int]:
+        return self.ask("counters")
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        ready, _, _ = select.select([self._process.stdout], [], [], START_LIMIT_S)
+        line = self._process.stdout.readline() if ready else ""
+        assert line, "the emulator process gave no answer"
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+
+@contextlib.contextmanager
+def ft300_process(**options: Any) -> Iterator[EmulatorProcess]:
+    """Run an emulator; options as of `Ft300Emulator`, plus `wrench`, `ramp` and `knobs` (a dict)."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.wire.ft300_process", json.dumps(options)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        bufsize=1,
+        cwd=ROOT,
+    )
+    try:
+        yield EmulatorProcess(process)
+    finally:
+        assert process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.close()
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+def until(condition: Any, limit_s: float = 5.0, pause_s: float = 0.002) -> bool:
+    """Wait until `condition()`; False when it is not true within the limit."""
+    deadline_s = time.monotonic() + limit_s
+    while time.monotonic() < deadline_s:
+        if condition():
+            return True
+        time.sleep(pause_s)
+    return bool(condition())
+
+
+def main(options: dict[str, Any]) -> None:
+    loop = EventLoop()
+    wrench = tuple(options.pop("wrench", WRENCH))
+    source = Ramp() if options.pop("ramp", False) else ConstantWrench(wrench)
+    knobs = Ft300Knobs(**options.pop("knobs", {}))
+    emulator = Ft300Emulator(loop, source, knobs=knobs, **options)
+    emulator.start()
+    print(json.dumps({"port": emulator.port}), flush=True)
+
+    def on_command(_events: int) -> None:
+        text = os.read(0, 4096).decode()
+        if not text:
+            loop.stop()
+        for line in text.splitlines():
+            command, *args = json.loads(line)
+            if command == "knobs":
+                emulator.knobs = Ft300Knobs(**args[0])
+            elif command in ("stall", "hang_up"):
+                getattr(emulator, command)(*args)
+            print(json.dumps({**emulator.counters, "streaming": emulator.streaming}), flush=True)
+
+    loop.add_fd(0, on_command)
+    loop.run()
+    emulator.close()
+    loop.close()
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))
