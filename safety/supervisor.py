@@ -21,10 +21,10 @@ REST_NS = 300_000_000
 REST_AT_MOST_NS = 1_500_000_000
 """... or after this long, whatever is measured (the measurement itself may be what failed)."""
 REST_SPEED_M_PER_S = 0.01
+HELD_NS = 2_000_000_000
+"""A HOLD that cannot clear by itself ends the run after this long at zero."""
 STALENESS = ("F01", "F24", "F25", "F31", "F40", "F67-late")
 """Faults of age: right after a pause of this host they say more about the host than about the device."""
-
-OPERATOR_EXIT = 130
 
 
 class Verdict(msgspec.Struct, frozen=True, gc=False):
@@ -61,6 +61,13 @@ def supervise(
     state = replace(state, mode=int(mode), stop_since_ns=stop_since)
     finished, code = _ending(state, inp, control)
     return state, Verdict(mode, tuple(dict.fromkeys([*latched, *faults])), finished, code)
+
+
+def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
+    """Return the verdict on a tick whose checks themselves failed (an exception in the loop): dead, at once."""
+    latched = tuple(dict.fromkeys([*state.latched, "F68"]))
+    state = replace(state, mode=int(Mode.DEAD), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
+    return state, Verdict(Mode.DEAD, latched, True, FAULTS["F68"].exit_code)
 
 
 def note_command(state: SafetyState, command: BodyTwist, now_ns: int) -> SafetyState:
@@ -138,6 +145,9 @@ def _ending(state: SafetyState, inp: TickInput, control: ControlState) -> tuple[
         # An unknown (NaN) speed compares false: it is not taken for rest.
         rest = abs(twist.vx) < REST_SPEED_M_PER_S and abs(twist.vy) < REST_SPEED_M_PER_S
         return (rest and zero_ns >= REST_NS) or zero_ns >= REST_AT_MOST_NS, code
+    held = [i for i in state.latched if FAULTS[i].mode == Mode.HOLD]
+    if held and state.mode == Mode.HOLD and state.zero_since_ns and inp.now_ns - state.zero_since_ns >= HELD_NS:
+        return True, FAULTS[held[0]].exit_code
     if control.phase == Phase.DONE:
         return True, 0
     if control.phase == Phase.FAILED:

@@ -23,10 +23,10 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
         faults.append("R01")
     if phase == Phase.TARE and control.refusal:
         faults.append(_REFUSALS[control.refusal])
-    if phase in (Phase.LOST, Phase.LOST_HOLD) and control.contact_seen:
+    if phase == Phase.LOST:
         faults.append("F52")
-    if phase == Phase.LOST_HOLD and not control.contact_seen:
-        faults.append("F53")
+    if phase == Phase.LOST_HOLD:
+        faults.append("F52-hold" if control.contact_seen else "F53")
     if control.backward_ticks >= BACKWARD_TICKS:
         faults.append("F56")
     if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):

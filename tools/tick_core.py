@@ -7,10 +7,11 @@ import msgspec
 from control.settings import Settings
 from control.step import step
 from robot_io.config import RigConfig
-from robot_io.tick import ControlTick, TickInput, TickOutput, TickState
+from robot_io.messages import BodyTwist, WorldTwist
+from robot_io.tick import ControlTick, EnvelopeState, TickInput, TickOutput, TickState
 from safety import envelope
 from safety.settings import SafetySettings
-from safety.supervisor import note_command, supervise
+from safety.supervisor import give_up, note_command, supervise
 
 
 class TickCore(msgspec.Struct, frozen=True):
@@ -26,6 +27,20 @@ class TickCore(msgspec.Struct, frozen=True):
 
     def fold(self, state: TickState, inp: TickInput) -> tuple[TickState, TickOutput]:
         """Return the state after this tick and what it says. Pure: same arguments, same result, bit for bit."""
+        if inp.host.loop_error:  # this tick has already failed once: nothing of it is computed again
+            dead, verdict = give_up(state.safety, inp)
+            still = EnvelopeState(BodyTwist(), state.envelope.clamps, False)
+            return TickState(state.control, dead, still), TickOutput(
+                int(verdict.mode),
+                verdict.faults,
+                WorldTwist(),
+                BodyTwist(),
+                BodyTwist(),
+                0.0,
+                0.0,
+                True,
+                verdict.exit_code,
+            )
         control, wanted = step(self.control, state.control, inp)
         clamped = state.envelope.clamped
         safety, verdict = supervise(self.safety, state.safety, inp, control, wanted.body, clamped)

@@ -1,0 +1,253 @@
+"""The fixed-rate loop: the one impure room of control.
+
+One thread, one epoll: absolute deadlines from a timerfd, and the sensor's own descriptor, so that every packet
+gets an honest arrival stamp. A tick drains everything without blocking, folds, sends one frame to the gate and
+pushes one record into the log ring. Nothing here waits for anything but the next deadline.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Protocol
+
+from control.pacer import wake
+from control.run_notes import RunNotes
+from control.timing import LoopTiming
+from robot_io.arm_record import ArmRecord
+from robot_io.base_link import BaseLink
+from robot_io.clock import ClockNs, monotonic_ns
+from robot_io.event_loop import EventLoop, Timer
+from robot_io.messages import BodyTwist, DeviceHealth, LinkState, SensorWrench, Stamped
+from robot_io.ring import Ring
+from robot_io.tick import (
+    TICK_CDR,
+    ControlTick,
+    FtInput,
+    FtReading,
+    HostInput,
+    Operator,
+    TickInput,
+    TickOutput,
+    TickState,
+)
+
+TICK_KIND = 1
+"""Kind of a control tick in the log ring."""
+OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
+MAX_READINGS = 64
+"""More packets than this in one tick (half a second of them) are a flood; the oldest go."""
+
+Fold = Callable[[TickState, TickInput], tuple[TickState, TickOutput]]
+
+
+class Sensor(Protocol):
+    """What the loop needs of the force-torque sensor's driver."""
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait on, or raise OSError when it is closed."""
+        ...
+
+    def drain(self) -> tuple[Stamped[SensorWrench], ...]:
+        """Return every new sample, oldest first."""
+        ...
+
+    def health(self) -> DeviceHealth:
+        """Return link state and counters."""
+        ...
+
+
+class Arm(Protocol):
+    """What the loop needs of the arm."""
+
+    def read(self) -> ArmRecord | None:
+        """Return the newest record."""
+        ...
+
+
+class Watch:
+    """Descriptors that say when another process is gone (pidfds), by name."""
+
+    def __init__(self, **pidfds: int) -> None:
+        self.pidfds = pidfds
+        self.gone: set[str] = set()
+
+
+class ControlLoop:
+    """Runs ticks until the fold says finished; `timing` and `last` tell how it went."""
+
+    def __init__(
+        self,
+        fold: Fold,
+        state: TickState,
+        *,
+        rate_hz: float,
+        sensor: Sensor,
+        arm: Arm,
+        base: BaseLink,
+        ring: Ring,
+        watch: Watch,
+        operator_fd: int,
+        on_status: Callable[[TickInput, TickState, TickOutput], None],
+        clock: ClockNs = monotonic_ns,
+    ) -> None:
+        self._fold = fold
+        self._state = state
+        self._period_ns = round(1e9 / rate_hz)
+        self._status_every = max(1, round(rate_hz / 5.0))
+        self._sensor, self._arm, self._base, self._ring, self._watch = sensor, arm, base, ring, watch
+        self._operator_fd = operator_fd
+        self._on_status = on_status
+        self._clock = clock
+        self._loop = EventLoop()
+        self._timer: Timer | None = None
+        self._tick = -1
+        self._readings: list[Stamped[SensorWrench]] = []
+        self._operator = Operator.NONE
+        self._arm_record = ArmRecord()
+        self.timing = LoopTiming()
+        self.notes = RunNotes()
+        self.first_ns = self.last_ns = 0
+        self.last: tuple[TickInput, TickState, TickOutput] | None = None
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        """Serve until finished. An exception in a tick sends zero, is logged as F68, and is left in `error`."""
+        self._loop.add_fd(self._sensor.fileno(), self._on_sensor)
+        self._loop.add_fd(self._operator_fd, self._on_operator)
+        for name, pidfd in self._watch.pidfds.items():
+            self._loop.add_fd(pidfd, lambda _events, name=name: self._on_gone(name))
+        self.first_ns = self._clock() + self._period_ns
+        self._timer = self._loop.call_at(self.first_ns, self._on_deadline)
+        try:
+            self._loop.run()
+        finally:
+            self._loop.close()
+
+    def stop_requested(self) -> None:
+        """Pass on a stop that reached this process itself (SIGTERM); safe in a signal handler."""
+        self._operator = Operator.STOP
+
+    def _on_sensor(self, _events: int) -> None:
+        self._collect()
+        if self._sensor.health().state == LinkState.LOST:
+            self._loop.remove_fd(self._sensor.fileno())
+
+    def _collect(self) -> None:
+        self._readings.extend(self._sensor.drain())
+        del self._readings[:-MAX_READINGS]
+
+    def _on_operator(self, _events: int) -> None:
+        try:
+            typed = os.read(self._operator_fd, 64)
+        except BlockingIOError:
+            return
+        if not typed:  # the launcher is gone
+            self._loop.remove_fd(self._operator_fd)
+            typed = b"S"
+        for key in typed:
+            event = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
+            if self._operator != Operator.STOP:
+                self._operator = event
+
+    def _on_gone(self, name: str) -> None:
+        self._watch.gone.add(name)
+        self._loop.remove_fd(self._watch.pidfds[name])
+
+    def _on_deadline(self, deadline_ns: int) -> None:
+        now_ns = self._clock()
+        paced = wake(deadline_ns, self._period_ns, now_ns)
+        self._timer = self._loop.call_at(paced.next_deadline_ns, self._on_deadline)
+        self._tick += 1 + paced.skipped
+        self._collect()
+        # Drained first: packets that waited during a pause are in before anybody judges their age.
+        inp = self._input(self._clock(), paced.late_ns, paced.skipped)
+        try:
+            self._one_tick(inp)
+        except Exception as error:  # the loop's top: whatever failed up there, the base gets zero and the log says so
+            self._give_up(inp, error)
+        self.last_ns = now_ns
+        self.timing.note(paced.late_ns, paced.skipped, self._clock() - now_ns)
+
+    def _one_tick(self, inp: TickInput) -> None:
+        before = self._state
+        after, output = self._fold(before, inp)
+        self._base.command(output.command_body, tick=inp.tick, mode=output.mode)
+        self._ring.push(TICK_KIND, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, before, after, output)))
+        self._state = after
+        self.last = (inp, after, output)
+        self.notes.note(inp, output)
+        if inp.tick % self._status_every == 0 or output.finished:
+            self._on_status(inp, after, output)
+        if output.finished:
+            self._loop.stop()
+
+    def _give_up(self, inp: TickInput, error: Exception) -> None:
+        self.error = error
+        self._loop.stop()
+        self._base.command(BodyTwist(), tick=inp.tick + 1, mode=0)
+        failed = TickInput(
+            inp.tick,
+            inp.now_ns,
+            inp.operator,
+            HostInput(
+                inp.host.late_ns,
+                inp.host.skipped,
+                inp.host.gate_alive,
+                inp.host.arm_alive,
+                inp.host.recorder_alive,
+                True,
+                inp.host.log_dropped,
+            ),
+            inp.ft,
+            inp.arm,
+            inp.base,
+        )
+        before = self._state
+        after, output = self._fold(before, failed)
+        self._ring.push(TICK_KIND, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, failed, before, after, output)))
+        self.last = (failed, after, output)
+        self.notes.note(failed, output)
+
+    def _input(self, now_ns: int, late_ns: int, skipped: int) -> TickInput:
+        gone = self._watch.gone
+        record = self._arm.read()
+        if record is not None:
+            self._arm_record = record
+        health = self._sensor.health()
+        readings, self._readings = self._readings, []
+        operator, self._operator = self._operator, Operator.NONE
+        return TickInput(
+            self._tick,
+            now_ns,
+            int(operator),
+            HostInput(
+                late_ns,
+                skipped,
+                self._base.alive and "gate" not in gone,
+                "arm" not in gone,
+                "recorder" not in gone,
+                False,
+                self._ring.dropped,
+            ),
+            ft_input(readings, health),
+            self._arm_record,
+            self._base.read(),
+        )
+
+
+def ft_input(
+    readings: list[Stamped[SensorWrench]] | tuple[Stamped[SensorWrench], ...], health: DeviceHealth
+) -> FtInput:
+    """Return the sensor's part of a tick's input."""
+    counters = health.counters
+    return FtInput(
+        tuple(
+            FtReading(s.received_ns, s.seq, (s.value.fx, s.value.fy, s.value.fz), (s.value.mx, s.value.my, s.value.mz))
+            for s in readings
+        ),
+        int(health.state),
+        counters["packets_ok"],
+        counters["crc_fail"],
+        counters["junk_bytes"],
+    )

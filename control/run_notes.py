@@ -1,0 +1,57 @@
+"""What a run says of itself at the end: when modes and faults changed, and how often each fault came."""
+
+from __future__ import annotations
+
+from robot_io.tick import Mode, Phase, TickInput, TickOutput, TickState
+
+MOST_EVENTS = 200
+
+
+class RunNotes:
+    """Collects changes of phase, mode and faults, bounded, while the run goes on."""
+
+    def __init__(self) -> None:
+        self.events: list[dict[str, object]] = []
+        self.fault_counts: dict[str, int] = {}
+        self._last: tuple[int, tuple[str, ...]] = (int(Mode.SILENT), ())
+        self._first_ns = 0
+
+    def note(self, inp: TickInput, output: TickOutput) -> None:
+        """Note one tick."""
+        if not self._first_ns:
+            self._first_ns = inp.now_ns
+        if (output.mode, output.faults) == self._last:
+            return
+        for fault in output.faults:
+            if fault not in self._last[1]:
+                self.fault_counts[fault] = self.fault_counts.get(fault, 0) + 1
+        if output.faults != self._last[1] and len(self.events) < MOST_EVENTS:
+            self.events.append(
+                {
+                    "t_s": round((inp.now_ns - self._first_ns) * 1e-9, 3),
+                    "tick": inp.tick,
+                    "mode": Mode(output.mode).name,
+                    "faults": list(output.faults),
+                }
+            )
+        self._last = (output.mode, output.faults)
+
+
+def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
+    """Return the figures of the end of a run (m, N)."""
+    control = state.control
+    ended = control.phase in (Phase.RETREAT, Phase.CHECK, Phase.DONE, Phase.FAILED)
+    return {
+        "exit_code": output.exit_code,
+        "phase": Phase(control.phase).name,
+        "mode": Mode(output.mode).name,
+        "faults": list(output.faults),
+        "distance_m": control.end_progress_m if ended else control.progress_m,
+        "lateral_error_m": control.end_lateral_m if ended else control.lateral_m,
+        "contact_seen": control.contact_seen,
+        "residual_N": control.residual_N if control.residual_N == control.residual_N else None,
+        "bias_force_N": list(control.bias_force),
+        "bias_torque_Nm": list(control.bias_torque),
+        "tared": control.tared,
+        "arm_packets": inp.arm.packets,
+    }

@@ -1,0 +1,67 @@
+"""How a child process speaks to the one that started it: JSON lines on a pipe, never blocking the speaker."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from typing import Any
+
+import msgspec
+
+from robot_io.errors import PushError
+
+
+class StatusPipe:
+    """The speaking end; a full or closed pipe loses the line, never the process."""
+
+    def __init__(self, fd: int) -> None:
+        self._fd = fd
+        os.set_blocking(fd, False)
+
+    def say(self, event: str, **facts: object) -> None:
+        """Send one line: {"event": event, ...facts}."""
+        line = msgspec.json.encode({"event": event, **facts}) + b"\n"
+        with contextlib.suppress(OSError):
+            os.write(self._fd, line)
+
+    def error(self, error: PushError) -> None:
+        """Send {"event": "error", "error": {code, what, where, do}}."""
+        self.say("error", error=error.as_json())
+
+
+class StatusReader:
+    """The listening end: collects whole lines from a non-blocking pipe."""
+
+    def __init__(self, fd: int) -> None:
+        self.fd = fd
+        os.set_blocking(fd, False)
+        self._rest = b""
+        self.open = True
+
+    def read(self) -> list[dict[str, Any]]:
+        """Return the events that arrived; `open` turns False at EOF. Lines that are not JSON are left out."""
+        while self.open:
+            try:
+                chunk = os.read(self.fd, 65536)
+            except BlockingIOError:
+                break
+            except OSError:
+                chunk = b""
+            if not chunk:
+                self.open = False
+            self._rest += chunk
+        *lines, self._rest = self._rest.split(b"\n")
+        events = []
+        for line in lines:
+            with contextlib.suppress(msgspec.DecodeError):
+                event = msgspec.json.decode(line)
+                if isinstance(event, dict):
+                    events.append(event)
+        return events
+
+    def close(self) -> None:
+        """Close the pipe; idempotent."""
+        if self.fd >= 0:
+            os.close(self.fd)
+            self.fd = -1
+            self.open = False

@@ -1,0 +1,137 @@
+"""The control process: `python -m tools.control_process` (job on stdin). Opens the sensor and runs the loop."""
+
+from __future__ import annotations
+
+import gc
+import os
+import select
+import signal
+import socket
+import sys
+
+import msgspec
+
+from control.loop import ControlLoop, Watch
+from control.run_notes import outcome
+from robot_io.base_link import BaseLink
+from robot_io.config import rig_from_toml
+from robot_io.errors import PushError
+from robot_io.ft300 import Ft300
+from robot_io.process import die_with_parent, set_timer_slack_1ns, try_realtime
+from robot_io.ring import Ring
+from robot_io.status_pipe import StatusPipe
+from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState, Vector6
+from robot_io.ur10 import ArmLink
+from tools.jobs import ControlJob
+from tools.tick_core import TickCore
+
+PRIORITY = 80
+
+
+def first_state(bias: Vector6 | None) -> TickState:
+    """Return the state a run begins with: untared, or with a bias saved earlier in this power cycle."""
+    if bias is None:
+        return TickState()
+    return TickState(ControlState(tared=True, bias_force=bias[:3], bias_torque=bias[3:]))
+
+
+def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
+    """Return the figures of the live line."""
+    control = state.control
+    return {
+        "tick": inp.tick,
+        "phase": Phase(control.phase).name,
+        "mode": Mode(output.mode).name,
+        "progress_m": round(control.progress_m, 4),
+        "lateral_m": round(control.lateral_m, 4),
+        "force_N": [round(value, 2) for value in control.force_world],
+        "theta_p": round(control.theta_p, 4),
+        "speed": round(control.speed, 4),
+        "faults": list(output.faults),
+        "late_ms": round(inp.host.late_ns * 1e-6, 3),
+    }
+
+
+def main() -> int:
+    """Run the loop to its end; the exit code is the run's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=ControlJob)
+    die_with_parent(job.launcher_pid)
+    set_timer_slack_1ns()
+    status = StatusPipe(job.status_fd)
+    rig = rig_from_toml(job.rig_toml)
+    sensor = Ft300(job.ft_port)
+    try:
+        info = sensor.open()
+        sensor.start()
+    except PushError as error:
+        sensor.close()
+        status.error(error)
+        return error.exit_code
+    core = TickCore.of(rig, in_contact=job.in_contact)
+    base = BaseLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
+    arm = ArmLink(job.arm_record_fd)
+    watch = Watch(
+        gate=os.pidfd_open(job.gate_pid), arm=os.pidfd_open(job.arm_pid), recorder=os.pidfd_open(job.recorder_pid)
+    )
+    loop = ControlLoop(
+        core.fold,
+        first_state(job.saved_bias),
+        rate_hz=rig.loop.rate_hz,
+        sensor=sensor,
+        arm=arm,
+        base=base,
+        ring=Ring(job.ring_fd),
+        watch=watch,
+        operator_fd=job.operator_fd,
+        on_status=lambda inp, state, output: status.say("status", **status_line(inp, state, output)),
+    )
+    signal.signal(signal.SIGTERM, lambda *_: loop.stop_requested())
+    status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
+    if not _wait_for_go(job.operator_fd, sensor):
+        base.close()
+        sensor.stop()
+        sensor.close()
+        return 1
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    loop.run()
+    base.close()  # first of all: the gate takes the EOF for the end and sends its last zeros
+    gc.enable()
+    return _finish(loop, sensor, status, rig.loop.rate_hz)
+
+
+def _wait_for_go(operator_fd: int, sensor: Ft300) -> bool:
+    """Wait until the launcher says that every device is ready; keep the sensor drained meanwhile."""
+    os.set_blocking(operator_fd, False)
+    while True:
+        readable, _, _ = select.select([operator_fd], [], [], 0.05)
+        sensor.drain()
+        if readable:
+            return os.read(operator_fd, 1) == b"G"
+
+
+def _finish(loop: ControlLoop, sensor: Ft300, status: StatusPipe, rate_hz: float) -> int:
+    counters = sensor.health().counters
+    sensor.stop()
+    sensor.close()
+    if loop.last is None:
+        return 1
+    figures = outcome(*loop.last)
+    status.say(
+        "finished",
+        **figures,
+        loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns),
+        events=loop.notes.events,
+        fault_counts=loop.notes.fault_counts,
+        ft=counters,
+        error="" if loop.error is None else f"{type(loop.error).__name__}: {loop.error}",
+    )
+    if loop.error is not None:
+        sys.excepthook(type(loop.error), loop.error, loop.error.__traceback__)
+    return loop.last[2].exit_code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

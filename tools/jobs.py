@@ -1,0 +1,39 @@
+"""What the launcher hands to each process of a run: one JSON object on stdin, descriptors inherited."""
+
+from __future__ import annotations
+
+import msgspec
+
+from robot_io.tick import Vector6
+
+
+class ControlJob(msgspec.Struct, frozen=True):
+    """For `tools.control_process`."""
+
+    rig_toml: str
+    ft_port: str
+    in_contact: bool
+    saved_bias: Vector6 | None
+    launcher_pid: int
+    gate_fd: int
+    base_record_fd: int
+    arm_record_fd: int
+    ring_fd: int
+    alive_fd: int
+    operator_fd: int
+    status_fd: int
+    gate_pid: int
+    arm_pid: int
+    recorder_pid: int
+
+
+class EmulatorJob(msgspec.Struct, frozen=True):
+    """For `tools.emulator_process`."""
+
+    rig_toml: str
+    seed: int
+    devices: tuple[str, ...]
+    launcher_pid: int
+    ring_fd: int
+    alive_fd: int
+    status_fd: int
