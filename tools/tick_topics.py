@@ -1,0 +1,182 @@
+"""The topics that people plot, made from `/control/tick`: a pure view of what the tick holds, for ROS tools.
+
+Header stamps and log times are wall time in ns: the tick's CLOCK_MONOTONIC times plus the run's offset.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from robot_io.clock import NS_PER_S
+from robot_io.log_channels import BY_TOPIC
+from robot_io.log_messages import LoopTiming, SafetyEvent
+from robot_io.messages import BodyTwist, LinkState
+from robot_io.ros_messages import (
+    DiagnosticArray,
+    DiagnosticStatus,
+    Header,
+    JointState,
+    KeyValue,
+    Log,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistStamped,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+    ros_time,
+    yaw_quaternion,
+)
+from robot_io.tick import ControlTick, FtReading, Mode
+from safety.faults import FAULTS
+
+WORLD_FRAME, BASE_FRAME, SENSOR_FRAME = "world", "base_link", "ft_sensor"
+JOINT_NAMES = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
+_NO_TORQUE = Vector3(math.nan, math.nan, math.nan)
+_MODE_NAMES = {int(mode): mode.name for mode in Mode}
+_INFO, _WARN, _ERROR = 20, 30, 40
+
+
+class Message(NamedTuple):
+    """A message to be written: topic, log time in ns since 1970, payload."""
+
+    topic: str
+    log_time_ns: int
+    payload: bytes
+
+
+def message(topic: str, log_time_ns: int, value: Any) -> Message:
+    """Encode `value` for one of the program's own topics."""
+    return Message(topic, log_time_ns, BY_TOPIC[topic].cdr_type.encode(value))
+
+
+class TickTopics:
+    """Derives the other topics from ticks that come in order; remembers only what was said last."""
+
+    def __init__(self, wall_offset_ns: int) -> None:
+        self._offset_ns = wall_offset_ns
+        self._faults: tuple[str, ...] = ()
+        self._arm_packets = 0
+        self._pose_seq = 0
+        self._diagnosed_ns: int | None = None
+
+    def expand(self, tick: ControlTick) -> list[Message]:
+        """Return the messages of one tick, raw samples first."""
+        inp, out = tick.input, tick.output
+        now_ns = inp.now_ns + self._offset_ns
+        header = Header(ros_time(now_ns), WORLD_FRAME)
+        body = Header(header.stamp, BASE_FRAME)
+        messages = [self._raw_wrench(reading) for reading in inp.ft.readings]
+        force = Vector3(*tick.after.control.force_world)
+        messages.append(message("/ft/wrench", now_ns, WrenchStamped(header, Wrench(force, _NO_TORQUE))))
+        messages.append(message("/base/cmd_vel_raw", now_ns, _twist(body, out.wanted_body)))
+        messages.append(message("/base/cmd_vel", now_ns, _twist(body, out.command_body)))
+        host = inp.host
+        timing = LoopTiming(
+            header, inp.tick, inp.now_ns - host.late_ns, host.late_ns, host.skipped, host.skipped > 0, host.log_dropped
+        )
+        messages.append(message("/loop/timing", now_ns, timing))
+        messages += self._arm(tick)
+        messages += self._base(tick)
+        messages += self._events(tick, header, now_ns)
+        if self._diagnosed_ns is None or inp.now_ns - self._diagnosed_ns >= NS_PER_S:
+            self._diagnosed_ns = inp.now_ns
+            messages.append(message("/diagnostics", now_ns, _diagnostics(tick, header)))
+        return messages
+
+    def _raw_wrench(self, reading: FtReading) -> Message:
+        time_ns = reading.received_ns + self._offset_ns
+        wrench = Wrench(Vector3(*reading.force), Vector3(*reading.torque))
+        return message("/ft/wrench_raw", time_ns, WrenchStamped(Header(ros_time(time_ns), SENSOR_FRAME), wrench))
+
+    def _arm(self, tick: ControlTick) -> list[Message]:
+        arm = tick.input.arm
+        if arm.packets == self._arm_packets:
+            return []
+        self._arm_packets = arm.packets
+        time_ns = arm.changed_ns + self._offset_ns
+        state = JointState(
+            Header(ros_time(time_ns), BASE_FRAME), JOINT_NAMES, arm.joints.position, arm.joints.velocity, ()
+        )
+        return [message("/arm/joint_states", time_ns, state)]
+
+    def _base(self, tick: ControlTick) -> list[Message]:
+        base = tick.input.base
+        if base.pose_seq == self._pose_seq or not base.pose_valid:
+            return []
+        self._pose_seq = base.pose_seq
+        time_ns = base.pose_received_ns + self._offset_ns
+        pose = Transform(Vector3(base.pose.x, base.pose.y, 0.0), yaw_quaternion(base.pose.yaw))
+        placed = TransformStamped(Header(ros_time(time_ns), WORLD_FRAME), BASE_FRAME, pose)
+        return [message("/tf", time_ns, TFMessage((placed,)))]
+
+    def _events(self, tick: ControlTick, header: Header, now_ns: int) -> list[Message]:
+        before, after = tick.before.safety.mode, tick.after.safety.mode
+        faults, self._faults, known = tick.output.faults, tick.output.faults, self._faults
+        if faults == known and before == after:
+            return []
+        said = []
+        for fault in faults:
+            if fault not in known:
+                row = FAULTS.get(fault)
+                said.append(("fault", fault, row.text if row else fault, _ERROR if row and row.mode else _WARN))
+        for fault in known:
+            if fault not in faults:
+                said.append(("cleared", fault, f"over: {FAULTS[fault].text if fault in FAULTS else fault}", _INFO))
+        if before != after:
+            said.append(("mode", "", f"{_mode(before)} -> {_mode(after)}", _WARN if after > Mode.PUSHING else _INFO))
+        messages = []
+        for kind, fault, text, level in said:
+            event = SafetyEvent(header, tick.input.tick, kind, fault, text, before, after)
+            messages.append(message("/safety/event", now_ns, event))
+            line = f"{fault} {text}".strip()
+            messages.append(message("/rosout", now_ns, Log(header.stamp, level, "safety", line, "", "", 0)))
+        return messages
+
+
+def _twist(header: Header, twist: BodyTwist) -> TwistStamped:
+    return TwistStamped(header, Twist(Vector3(twist.vx, twist.vy, 0.0), Vector3(0.0, 0.0, twist.omega)))
+
+
+def _mode(number: int) -> str:
+    return _MODE_NAMES.get(number, str(number))
+
+
+def _diagnostics(tick: ControlTick, header: Header) -> DiagnosticArray:
+    ft, arm, base, host = tick.input.ft, tick.input.arm, tick.input.base, tick.input.host
+    arm_up = arm.link == LinkState.UP and not arm.error
+    base_up = base.pose_valid and not base.latched
+    return DiagnosticArray(
+        header,
+        (
+            _status("ft300", ft.link == LinkState.UP, packets=ft.packets_ok, crc_fail=ft.crc_fail, junk=ft.junk_bytes),
+            _status("ur10", arm_up, packets=arm.packets, error=arm.error, robot_mode=arm.joints.robot_mode),
+            _status(
+                "ridgeback",
+                base_up and not base.status.stop_engaged,
+                battery_v=round(base.status.battery_v, 2),
+                stop_engaged=base.status.stop_engaged,
+                gate_verdict=base.verdict,
+                gate_latched=base.latched,
+            ),
+            _status("loop", not host.loop_error and host.skipped == 0, skipped=host.skipped, dropped=host.log_dropped),
+            _status(
+                "safety", not tick.output.faults, mode=_mode(tick.output.mode), faults=" ".join(tick.output.faults)
+            ),
+        ),
+    )
+
+
+def _status(name: str, good: bool, **values: object) -> DiagnosticStatus:
+    pairs = tuple(KeyValue(key, str(value)) for key, value in values.items())
+    return DiagnosticStatus(0 if good else 2, name, "ok" if good else "see values", name, pairs)
