@@ -88,7 +88,12 @@ def install(kind: str, pip: list[str], venv: Path) -> None:
     else:
         done = run(*pip, "install", "-q", "--disable-pip-version-check", *wanted, quiet=False)
     if not done:
-        hint = f" If a package had to be compiled: `{APT_BUILD}`." if sys.version_info[:2] >= WHEELS_BELOW else ""
+        hint = (
+            f" Python {'.'.join(map(str, WHEELS_BELOW))} and newer must compile ur_rtde: `{APT_BUILD}`, or name an older one: "
+            "`make PYTHON=python3.12 demo`."
+            if sys.version_info[:2] >= WHEELS_BELOW
+            else ""
+        )
         raise SetUpError(f"installing failed, for the reason above. Is a package index reachable?{hint}")
 
 
