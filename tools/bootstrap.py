@@ -19,9 +19,12 @@ ROOT = Path(__file__).resolve().parent.parent
 EXTRAS = {"runtime": "", "dev": "[dev,sweep,cluster]"}
 OLDEST = (3, 11)
 WHEELS_BELOW = (3, 13)
-"""ur_rtde comes ready-built for Pythons below this one; for newer ones it is compiled (needs cmake and boost)."""
+"""ur_rtde comes ready-built for Pythons below this one; for newer ones it is compiled."""
 APT_VENV = "sudo apt install python3-venv"
-APT_BUILD = "sudo apt install cmake g++ libboost-all-dev python3-dev"
+NO_WHEEL = (
+    "ur_rtde is ready-built for Python 3.11 and 3.12: `make PYTHON=python3.12 demo`; "
+    "to compile it instead: `sudo apt install git cmake g++ libboost-all-dev python3-dev`"
+)
 
 
 class SetUpError(Exception):
@@ -88,12 +91,7 @@ def install(kind: str, pip: list[str], venv: Path) -> None:
     else:
         done = run(*pip, "install", "-q", "--disable-pip-version-check", *wanted, quiet=False)
     if not done:
-        hint = (
-            f" Python {'.'.join(map(str, WHEELS_BELOW))} and newer must compile ur_rtde: `{APT_BUILD}`, or name an older one: "
-            "`make PYTHON=python3.12 demo`."
-            if sys.version_info[:2] >= WHEELS_BELOW
-            else ""
-        )
+        hint = f" {NO_WHEEL}" if sys.version_info[:2] >= WHEELS_BELOW else ""
         raise SetUpError(f"installing failed, for the reason above. Is a package index reachable?{hint}")
 
 
