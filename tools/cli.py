@@ -13,6 +13,7 @@ import os
 import select
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 from typing import NamedTuple, NoReturn
 
 from robot_io.error_report import report, unexpected
@@ -119,10 +120,16 @@ def dispatch(argv: Sequence[str]) -> int:
     name = " ".join(argv[:2]) if " ".join(argv[:2]) in COMMANDS else " ".join(argv[:1])
     if name not in COMMANDS:
         return _overview(argv)
-    command = available().get(name)
-    if command is None:
+    if name not in available():
         raise UsageError(f"`push {name}` is not part of this build", do="`push --help` lists the commands")
-    module = importlib.import_module(command.module)
+    module = importlib.import_module(COMMANDS[name].module)
+    args = parser_of(name, module).parse_args(list(argv[len(name.split()) :]))
+    return int(module.run(args))
+
+
+def parser_of(name: str, module: ModuleType) -> Parser:
+    """Return the parser of one command, with its examples below the help."""
+    command = COMMANDS[name]
     parser = Parser(
         prog=f"push {name}",
         description=f"{command.summary[0].upper()}{command.summary[1:]}.",
@@ -131,8 +138,7 @@ def dispatch(argv: Sequence[str]) -> int:
         allow_abbrev=False,
     )
     module.add_arguments(parser)
-    args = parser.parse_args(list(argv[len(name.split()) :]))
-    return int(module.run(args))
+    return parser
 
 
 def _overview(argv: Sequence[str]) -> int:

@@ -1,7 +1,9 @@
 """What the program says and returns when something is wrong, in this process with made-up commands."""
 
+import importlib
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -68,9 +70,19 @@ def test_each_error_is_one_sentence_and_its_code(kind, fake, capsys):
 def test_codes_are_the_documented_ones():
     codes = {kind.__name__: kind.exit_code for kind in ERROR_CLASSES}
     assert codes == {
-        "PushError": 1, "UsageError": 2, "ConfigError": 2, "EnvironmentFault": 3, "DeviceError": 4,
-        "DeviceUnreachable": 4, "DeviceProtocolError": 4, "DeviceNotReady": 4, "SafetyStop": 5,
-        "ContactLost": 6, "ReplayDiffers": 7, "LogDamaged": 8, "OperatorStop": 130,
+        "PushError": 1,
+        "UsageError": 2,
+        "ConfigError": 2,
+        "EnvironmentFault": 3,
+        "DeviceError": 4,
+        "DeviceUnreachable": 4,
+        "DeviceProtocolError": 4,
+        "DeviceNotReady": 4,
+        "SafetyStop": 5,
+        "ContactLost": 6,
+        "ReplayDiffers": 7,
+        "LogDamaged": 8,
+        "OperatorStop": 130,
     }
 
 
@@ -129,6 +141,15 @@ def test_every_command_of_this_build_has_help_with_two_examples(capsys):
         shown = capsys.readouterr().out
         assert shown.startswith(f"usage: push {name}")
         assert sum(line.startswith(f"  push {name}") for line in shown.splitlines()) >= 2, name
+
+
+@pytest.mark.parametrize("name", sorted(cli.available()))
+def test_the_examples_are_commands_that_parse(name):
+    parser = cli.parser_of(name, importlib.import_module(cli.COMMANDS[name].module))
+    for example in cli.COMMANDS[name].examples:
+        words = shlex.split(example)
+        assert words[: 1 + len(name.split())] == ["push", *name.split()]
+        parser.parse_args(words[1 + len(name.split()) :])
 
 
 def test_overview_lists_the_commands(capsys):
