@@ -1,0 +1,180 @@
+"""The ROS message types that the emulated bridge knows, and the checks a real one makes of a message's fields.
+
+Checks as observed: a missing field is zero, an int passes for a float, NaN and infinity pass; a string, boolean,
+null or list in place of a number, and a field the type does not have, make the whole message void. A header
+without stamp gets the robot's time (ROS 1 always, ROS 2 only when the header itself is there).
+Source of the definitions: the .msg files of std_msgs, geometry_msgs, nav_msgs, sensor_msgs, ridgeback_msgs.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+RosTime = tuple[int, int]
+Fields = tuple[tuple[str, str], ...]
+
+_INTS = {"uint8": (0, 2**8 - 1), "int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1)}
+_ROS1_NAME = re.compile(r"^[A-Za-z]\w*/[A-Za-z]\w*$")
+_ROS2_NAME = re.compile(r"^([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)$")
+
+
+def _fields(text: str) -> Fields:
+    pairs = (item.split() for item in text.split(","))
+    return tuple((name, kind) for kind, name in pairs)
+
+
+_XYZ = _fields("float64 x, float64 y, float64 z")
+
+DEFINITIONS: dict[str, Fields] = {
+    "std_msgs/Empty": (),
+    "std_msgs/Bool": _fields("bool data"),
+    "std_msgs/Int32": _fields("int32 data"),
+    "std_msgs/Float64": _fields("float64 data"),
+    "std_msgs/String": _fields("string data"),
+    "geometry_msgs/Vector3": _XYZ,
+    "geometry_msgs/Point": _XYZ,
+    "geometry_msgs/Quaternion": _fields("float64 x, float64 y, float64 z, float64 w"),
+    "geometry_msgs/Twist": _fields("geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular"),
+    "geometry_msgs/TwistStamped": _fields("std_msgs/Header header, geometry_msgs/Twist twist"),
+    "geometry_msgs/Pose": _fields("geometry_msgs/Point position, geometry_msgs/Quaternion orientation"),
+    "geometry_msgs/PoseStamped": _fields("std_msgs/Header header, geometry_msgs/Pose pose"),
+    "geometry_msgs/PoseWithCovariance": _fields("geometry_msgs/Pose pose, float64[36] covariance"),
+    "geometry_msgs/TwistWithCovariance": _fields("geometry_msgs/Twist twist, float64[36] covariance"),
+    "geometry_msgs/Transform": _fields("geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation"),
+    "geometry_msgs/TransformStamped": _fields(
+        "std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform"
+    ),
+    "nav_msgs/Odometry": _fields(
+        "std_msgs/Header header, string child_frame_id, geometry_msgs/PoseWithCovariance pose, "
+        "geometry_msgs/TwistWithCovariance twist"
+    ),
+    "sensor_msgs/JointState": _fields(
+        "std_msgs/Header header, string[] name, float64[] position, float64[] velocity, float64[] effort"
+    ),
+    "ridgeback_msgs/Status": _fields(
+        "std_msgs/Header header, string hardware_id, duration mcu_uptime, duration connection_uptime, "
+        "float32 pcb_temperature, float32 mcu_temperature, bool stop_power_status, bool stop_engaged, "
+        "bool drivers_active, bool external_stop_present, bool charger_connected, bool charging_complete, "
+        "float32 measured_battery, float32 measured_12v, float32 measured_5v, float32 measured_inverter, "
+        "float32 measured_front_axle, float32 measured_rear_axle, float32 measured_light, float32 total_current, "
+        "float32 total_current_peak, float64 total_power_consumed"
+    ),
+}
+
+
+class BadMessage(Exception):
+    """A message that the bridge drops; the text would go to the robot's log."""
+
+
+class RosTypes:
+    """Type names and message checks of one ROS version (1 or 2). `now` gives the robot's time (s, ns)."""
+
+    def __init__(self, ros_version: int, now: Callable[[], RosTime]) -> None:
+        self._ros2 = ros_version == 2
+        self._now = now
+
+    def canonical(self, name: object) -> str | None:
+        """Return the known type of that name as this ROS version spells it, or None."""
+        if not isinstance(name, str):
+            return None
+        if not self._ros2:
+            return name if _ROS1_NAME.match(name) and name in DEFINITIONS else None
+        match = _ROS2_NAME.match(name)
+        if match is None or f"{match[1]}/{match[2]}" not in DEFINITIONS:
+            return None
+        return f"{match[1]}/msg/{match[2]}"
+
+    def time(self, stamp: RosTime) -> dict[str, int]:
+        """Return a time as this ROS version writes it."""
+        return {"sec": stamp[0], "nanosec": stamp[1]} if self._ros2 else {"secs": stamp[0], "nsecs": stamp[1]}
+
+    def filled(self, type_name: str, message: object) -> dict[str, Any]:
+        """Check a message and fill in what it leaves out. Raises BadMessage."""
+        filled: dict[str, Any] = self._value(type_name.replace("/msg/", "/"), message, type_name)
+        return filled
+
+    def _value(self, kind: str, value: object, path: str) -> Any:
+        if kind in ("float64", "float32"):
+            return self._float(value, path)
+        if kind in _INTS:
+            low, high = _INTS[kind]
+            if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+                raise BadMessage(f"{path} needs {kind}")
+            return value
+        if kind == "bool" or kind == "string":
+            if not isinstance(value, bool if kind == "bool" else str):
+                raise BadMessage(f"{path} needs a {kind}")
+            return value
+        if kind in ("time", "duration"):
+            return self._time(value, path)
+        if kind.endswith("]"):
+            return self._list(kind, value, path)
+        return self._object(kind, value, path)
+
+    def _float(self, value: object, path: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise BadMessage(f"{path} needs a number")
+        try:
+            return float(value)
+        except OverflowError as error:
+            raise BadMessage(f"{path} is too large") from error
+
+    def _time(self, value: object, path: str) -> dict[str, int]:
+        if value == "now":
+            return self.time(self._now())
+        if not isinstance(value, dict):
+            raise BadMessage(f"{path} needs a time")
+        whole = _whole(value.get("secs", value.get("sec", 0)), path)
+        return self.time((whole, _whole(value.get("nsecs", value.get("nanosec", 0)), path)))
+
+    def _list(self, kind: str, value: object, path: str) -> list[Any]:
+        element, _, length = kind[:-1].partition("[")
+        if not isinstance(value, list) or (length and len(value) != int(length)):
+            raise BadMessage(f"{path} needs a list{' of ' + length if length else ''}")
+        return [self._value(element, item, path) for item in value]
+
+    def _object(self, kind: str, value: object, path: str) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise BadMessage(f"{path} needs an object")
+        fields = self._fields_of(kind)
+        unknown = value.keys() - {name for name, _ in fields}
+        if unknown:
+            raise BadMessage(f"{path} has no field {sorted(map(str, unknown))[0]}")
+        filled = {
+            name: self._value(field, value[name], f"{path}.{name}") if name in value else self._default(field)
+            for name, field in fields
+        }
+        if kind == "std_msgs/Header" and "stamp" not in value:
+            filled["stamp"] = self.time(self._now())
+        return filled
+
+    def _fields_of(self, kind: str) -> Fields:
+        if kind == "std_msgs/Header":
+            both = (("stamp", "time"), ("frame_id", "string"))
+            return both if self._ros2 else (("seq", "uint32"), *both)
+        return DEFINITIONS[kind]
+
+    def _default(self, kind: str) -> Any:
+        if kind in ("float64", "float32"):
+            return 0.0
+        if kind in _INTS:
+            return 0
+        if kind in ("bool", "string"):
+            return False if kind == "bool" else ""
+        if kind in ("time", "duration"):
+            return self.time((0, 0))
+        if kind.endswith("]"):
+            element, _, length = kind[:-1].partition("[")
+            return [self._default(element) for _ in range(int(length or 0))]
+        filled = {name: self._default(field) for name, field in self._fields_of(kind)}
+        if kind == "std_msgs/Header" and not self._ros2:
+            filled["stamp"] = self.time(self._now())
+        return filled
+
+
+def _whole(value: object, path: str) -> int:
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise BadMessage(f"{path} needs a time of ints")
+    return value

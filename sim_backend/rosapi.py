@@ -1,0 +1,60 @@
+"""The services of the `rosapi` node that a client of the bridge may call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from sim_backend.ros_graph import RosGraph
+from sim_backend.ros_types import RosTime
+
+Answer = tuple[bool, Any]
+
+
+class RosApi:
+    """Answers service calls: (True, values) or (False, a sentence)."""
+
+    def __init__(self, graph: RosGraph, now: Callable[[], RosTime]) -> None:
+        self._graph = graph
+        self._now = now
+        self._services: dict[str, tuple[tuple[str, ...], Callable[..., dict[str, Any]]]] = {
+            "/rosapi/topic_type": (("topic",), self._topic_type),
+            "/rosapi/publishers": (("topic",), self._publishers),
+            "/rosapi/subscribers": (("topic",), self._subscribers),
+            "/rosapi/topics": ((), self._topics),
+            "/rosapi/get_time": ((), self._get_time),
+        }
+
+    def call(self, service: str, arguments: object) -> Answer:
+        """Call a service with an object of named arguments or a list in order; missing ones are empty."""
+        name = service if service.startswith("/") else f"/{service}"
+        if name not in self._services:
+            return False, f"Service {service} does not exist"
+        fields, function = self._services[name]
+        if isinstance(arguments, list):
+            arguments = dict(zip(fields, arguments, strict=False))
+        if not isinstance(arguments, dict):
+            return False, f"{service}: arguments must be an object or a list"
+        wrong = [key for key, value in arguments.items() if key not in fields or not isinstance(value, str)]
+        if wrong:
+            return False, f"{service}: no such argument, or no string: {wrong[0]}"
+        return True, function(*(arguments.get(field, "") for field in fields))
+
+    def _topic_type(self, name: str) -> dict[str, Any]:
+        topic = self._graph.find(name)
+        return {"type": topic.type_name if topic else ""}
+
+    def _publishers(self, name: str) -> dict[str, Any]:
+        topic = self._graph.find(name)
+        return {"publishers": topic.publishers() if topic else []}
+
+    def _subscribers(self, name: str) -> dict[str, Any]:
+        topic = self._graph.find(name)
+        return {"subscribers": topic.subscribers() if topic else []}
+
+    def _topics(self) -> dict[str, Any]:
+        topics = sorted(self._graph.topics.values(), key=lambda topic: topic.name)
+        return {"topics": [topic.name for topic in topics], "types": [topic.type_name for topic in topics]}
+
+    def _get_time(self) -> dict[str, Any]:
+        return {"time": self._graph.types.time(self._now())}
