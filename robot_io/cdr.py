@@ -39,6 +39,7 @@ class CdrType(Generic[MessageT]):
             raise TypeError(f"{struct_type!r} is not a Struct")
         self.struct_type = struct_type
         self.name = name
+        self.shape = shape
         self.schema_text = schema_text(shape)
         self._layout = Layout(shape)
 

@@ -95,7 +95,7 @@ class _Walk:
             elif opcode == Opcode.METADATA:
                 yield Metadata.read(_stream(body))
             elif opcode != Opcode.MESSAGE_INDEX:
-                raise self._foreign(f"a record of kind {opcode} does not belong there")
+                raise _altered(self._path, f"a record of kind {opcode} does not belong there")
             crc = zlib.crc32(body, zlib.crc32(head, crc))
 
     def _record(self) -> tuple[bytes, bytes]:
@@ -111,8 +111,10 @@ class _Walk:
         return head, self._file.read(length)
 
     def _chunk(self, chunk: Chunk) -> Iterator[LogItem]:
+        if chunk.compression == "lz4":
+            raise self._foreign("its chunks are compressed with lz4")
         if chunk.uncompressed_size > RECORD_LIMIT or chunk.compression not in ("zstd", ""):
-            raise self._foreign("a chunk is too large or of an unknown compression")
+            raise _altered(self._path, "a chunk is larger than any of ours, or its compression unknown")
         data = chunk.data
         if chunk.compression == "zstd":
             with zstandard.ZstdDecompressor().stream_reader(data) as reader:
