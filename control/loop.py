@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
 from control.pacer import wake
@@ -18,6 +19,7 @@ from robot_io.arm_record import ArmRecord
 from robot_io.base_link import BaseLink
 from robot_io.clock import ClockNs, monotonic_ns
 from robot_io.event_loop import EventLoop, Timer
+from robot_io.log_channels import Kind
 from robot_io.messages import BodyTwist, DeviceHealth, LinkState, SensorWrench, Stamped
 from robot_io.ring import Ring
 from robot_io.tick import (
@@ -32,8 +34,6 @@ from robot_io.tick import (
     TickState,
 )
 
-TICK_KIND = 1
-"""Kind of a control tick in the log ring."""
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
 MAX_READINGS = 64
 """More packets than this in one tick (half a second of them) are a flood; the oldest go."""
@@ -116,7 +116,7 @@ class ControlLoop:
         self._loop.add_fd(self._sensor.fileno(), self._on_sensor)
         self._loop.add_fd(self._operator_fd, self._on_operator)
         for name, pidfd in self._watch.pidfds.items():
-            self._loop.add_fd(pidfd, lambda _events, name=name: self._on_gone(name))
+            self._loop.add_fd(pidfd, partial(self._on_gone, name))
         self.first_ns = self._clock() + self._period_ns
         self._timer = self._loop.call_at(self.first_ns, self._on_deadline)
         try:
@@ -150,7 +150,7 @@ class ControlLoop:
             if self._operator != Operator.STOP:
                 self._operator = event
 
-    def _on_gone(self, name: str) -> None:
+    def _on_gone(self, name: str, _events: int) -> None:
         self._watch.gone.add(name)
         self._loop.remove_fd(self._watch.pidfds[name])
 
@@ -173,7 +173,7 @@ class ControlLoop:
         before = self._state
         after, output = self._fold(before, inp)
         self._base.command(output.command_body, tick=inp.tick, mode=output.mode)
-        self._ring.push(TICK_KIND, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, before, after, output)))
+        self._ring.push(Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, before, after, output)))
         self._state = after
         self.last = (inp, after, output)
         self.notes.note(inp, output)
@@ -205,7 +205,9 @@ class ControlLoop:
         )
         before = self._state
         after, output = self._fold(before, failed)
-        self._ring.push(TICK_KIND, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, failed, before, after, output)))
+        self._ring.push(
+            Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, failed, before, after, output))
+        )
         self.last = (failed, after, output)
         self.notes.note(failed, output)
 

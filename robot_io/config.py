@@ -203,6 +203,8 @@ class WorldConfig(Table, frozen=True):
     """The simulated world, used at levels sim and emulated."""
 
     solver: Literal["exact", "osqp"] = "exact"
+    ball_radius_m: Annotated[float, Meta(ge=0.001, le=0.2)] = 0.05
+    """Radius of the contact ball."""
     slider: SliderConfig = SliderConfig()
     start: StartConfig = StartConfig()
     sensor: SensorModelConfig = SensorModelConfig()
@@ -242,10 +244,7 @@ def load_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConf
     """
     path = _find(name_or_path)
     data, origins = _read(path, ())
-    for setting in overrides:
-        key, value = toml_text.parse_setting(setting)
-        toml_text.put(data, key, value)
-        origins[key] = f"--set {'.'.join(key)}"
+    _lay_over(data, origins, overrides)
     return build(RigConfig, data, origins, str(path))
 
 
@@ -254,10 +253,21 @@ def rig_to_toml(rig: RigConfig) -> str:
     return toml_text.emit(msgspec.to_builtins(rig))
 
 
-def rig_from_toml(text: str, name: str = "rig") -> RigConfig:
-    """Read what `rig_to_toml` wrote; ConfigError (with `name` as its place) when it is anything else."""
+def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = ()) -> RigConfig:
+    """Read what `rig_to_toml` wrote, with `key=value` settings laid over it.
+
+    Raises ConfigError (with `name` as its place) when it is anything else, and as `load_rig` for the settings.
+    """
     data, origins = toml_text.parse(text, name)
+    _lay_over(data, origins, overrides)
     return build(RigConfig, data, origins, name)
+
+
+def _lay_over(data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str]) -> None:
+    for setting in overrides:
+        key, value = toml_text.parse_setting(setting)
+        toml_text.put(data, key, value)
+        origins[key] = f"--set {'.'.join(key)}"
 
 
 def _find(name_or_path: str | Path) -> Path:

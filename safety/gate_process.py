@@ -52,6 +52,8 @@ class GateJob(msgspec.Struct, frozen=True):
     record_fd: int
     ring_fd: int
     status_fd: int
+    wall_offset_ns: int
+    """Wall clock minus CLOCK_MONOTONIC, for stamps in the log."""
 
 
 class GateProcess:
@@ -64,7 +66,7 @@ class GateProcess:
         self._control = socket.socket(fileno=job.control_fd)
         self._control.setblocking(False)
         self._record_out = SharedRecord(job.record_fd, BASE_RECORD_BYTES)
-        self._log = GateLog(Ring(job.ring_fd))
+        self._log = GateLog(Ring(job.ring_fd).push, job.wall_offset_ns)
         self._record = BaseRecord()
         self._state = GateState()
         self._told = Latch.NONE
@@ -146,8 +148,9 @@ class GateProcess:
         if self._state.latch != self._told:
             self._told = self._state.latch
             cause = self._base.health().cause if self._told == Latch.LINK else ""
-            self._log.latch(now_ns, int(self._told), gate.LATCH_TEXT[self._told], cause)
-            self._status.say("latched", latch=int(self._told), text=gate.LATCH_TEXT[self._told], cause=cause)
+            text = ": ".join(filter(None, (gate.LATCH_TEXT[self._told], cause)))
+            self._log.latched(now_ns, self._state.seq, self._state.tick, int(self._told), text)
+            self._status.say("latched", latch=int(self._told), text=text)
             self._publish()
         wanted = gate.due(self._state, now_ns)
         if wanted is None:
@@ -155,7 +158,7 @@ class GateProcess:
         really = self._base.command(wanted)
         self._state = gate.sent(self._state, wanted, now_ns)
         self._record = replace(self._record, sent=really, sent_ns=now_ns)
-        self._log.sent(now_ns, really, self._state.seq)
+        self._log.sent(now_ns, really)
         self._publish()
 
     def _take(self, samples: tuple[Stamped[BaseFeed], ...]) -> None:

@@ -1,0 +1,72 @@
+"""What the gate writes into its log ring: everything the base said, what was really sent, and why it latched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from robot_io.base_feed import BaseFeed, BaseOdometry, BasePose, BaseReport, SliderPose
+from robot_io.log_channels import CHANNELS, Kind
+from robot_io.log_messages import GateDecision
+from robot_io.messages import BodyTwist, Stamped
+from robot_io.ros_messages import (
+    Header,
+    Odometry,
+    PoseStamped,
+    PoseWithCovariance,
+    Twist,
+    TwistStamped,
+    TwistWithCovariance,
+    Vector3,
+    planar_pose,
+    ros_time,
+)
+
+WORLD_FRAME, BASE_FRAME = "world", "base_link"
+_UNKNOWN = (0.0,) * 36
+"""Covariance that says nothing, as ROS has it."""
+
+
+class GateLog:
+    """Encodes and pushes; `push(kind, time_ns, payload)` is that of the gate's log ring."""
+
+    def __init__(self, push: Callable[[int, int, bytes], object], wall_offset_ns: int) -> None:
+        self._push_record = push
+        self._offset_ns = wall_offset_ns
+
+    def inbound(self, sample: Stamped[BaseFeed]) -> None:
+        """Log one sample of the base by its receive time."""
+        value, at_ns = sample.value, sample.received_ns
+        header = self._header(at_ns, WORLD_FRAME)
+        if isinstance(value, BasePose):
+            pose = planar_pose(value.pose.x, value.pose.y, value.pose.yaw)
+            self._push(Kind.BASE_POSE, at_ns, PoseStamped(header, pose))
+        elif isinstance(value, SliderPose):
+            pose = planar_pose(value.pose.x, value.pose.y, value.pose.yaw)
+            self._push(Kind.SLIDER_POSE, at_ns, PoseStamped(header, pose))
+        elif isinstance(value, BaseOdometry):
+            unplaced = PoseWithCovariance(planar_pose(math.nan, math.nan, 0.0), _UNKNOWN)
+            twist = TwistWithCovariance(_twist(value.twist), _UNKNOWN)
+            self._push(Kind.BASE_ODOM, at_ns, Odometry(header, BASE_FRAME, unplaced, twist))
+        elif isinstance(value, BaseReport):
+            self._push(Kind.BASE_STATUS, at_ns, value.status)
+
+    def sent(self, now_ns: int, twist: BodyTwist) -> None:
+        """Log what really went out to the base."""
+        self._push(Kind.GATE_SENT, now_ns, TwistStamped(self._header(now_ns, BASE_FRAME), _twist(twist)))
+
+    def latched(self, now_ns: int, seq: int, tick: int, verdict: int, text: str) -> None:
+        """Log why the gate latched."""
+        self._push(
+            Kind.GATE_DECISION, now_ns, GateDecision(self._header(now_ns, BASE_FRAME), seq, tick, verdict, True, text)
+        )
+
+    def _header(self, at_ns: int, frame: str) -> Header:
+        return Header(ros_time(at_ns + self._offset_ns), frame)
+
+    def _push(self, kind: Kind, at_ns: int, value: object) -> None:
+        self._push_record(int(kind), at_ns, CHANNELS[kind].cdr_type.encode(value))
+
+
+def _twist(twist: BodyTwist) -> Twist:
+    return Twist(Vector3(twist.vx, twist.vy, 0.0), Vector3(0.0, 0.0, twist.omega))

@@ -1,0 +1,82 @@
+"""Opens wire emulators on one world: used by a run's emulator process and by `push emulate all`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from robot_io.config import RigConfig
+from robot_io.errors import EnvironmentFault
+from robot_io.event_loop import EventLoop
+from sim_backend.ft300_emulator import Ft300Emulator
+from sim_backend.ridgeback_settings import RidgebackSettings
+from sim_backend.rosbridge_emulator import RosbridgeEmulator
+from sim_backend.ur_emulator import UrEmulator
+from sim_backend.world import World
+
+ARM_HOSTS = tuple(f"127.0.0.{last}" for last in range(10, 250))
+"""A UR10's ports are fixed, so each emulated arm needs a loopback address of its own."""
+
+
+class Emulator(Protocol):
+    """What all emulators have in common."""
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Counts by name."""
+        ...
+
+    def close(self) -> None:
+        """Stop serving."""
+        ...
+
+
+def open_ft300(loop: EventLoop, world: World, rig: RigConfig) -> Ft300Emulator:
+    """Open an FT 300 on the world; its `port` is a pty."""
+    sensor = rig.world.sensor
+    emulator = Ft300Emulator(loop, world, rate_hz=sensor.rate_hz, phase=sensor.phase, latency_ms=sensor.latency_ms)
+    emulator.start()
+    return emulator
+
+
+def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, ...] = ARM_HOSTS) -> UrEmulator:
+    """Open a UR10 on the first loopback address whose ports are free. Raises EnvironmentFault when none is."""
+    for host in hosts:
+        try:
+            return UrEmulator(loop, world, host=host, rate_hz=rig.world.arm_rate_hz, phase=rig.world.arm_phase)
+        except EnvironmentFault:
+            continue
+    raise EnvironmentFault(
+        "no loopback address is free for an emulated UR10",
+        where=f"{hosts[0]} to {hosts[-1]}",
+        do="Stop other emulators",
+    )
+
+
+def open_ridgeback(loop: EventLoop, world: World, rig: RigConfig) -> RosbridgeEmulator:
+    """Open a rosbridge with a Ridgeback behind it, on a free port."""
+    settings = RidgebackSettings(
+        topics=rig.base.topics,
+        mocap_rate_hz=rig.world.mocap_rate_hz,
+        base_phase=rig.world.base_phase,
+        base_rate_error=rig.world.base_tick_rate_error,
+        base_from_marker=rig.frames.base_from_marker,
+    )
+    return RosbridgeEmulator(loop, world, port=0, settings=settings)
+
+
+OPENERS: dict[str, Callable[[EventLoop, World, RigConfig], Emulator]] = {
+    "ft300": open_ft300,
+    "ur10": open_ur10,
+    "ridgeback": open_ridgeback,
+}
+
+
+def endpoint(emulator: Emulator) -> dict[str, str]:
+    """Return where an emulator can be reached: its `port`, `host` or `url`."""
+    if isinstance(emulator, Ft300Emulator):
+        return {"device": "ft300", "port": emulator.port}
+    if isinstance(emulator, UrEmulator):
+        return {"device": "ur10", "host": emulator.host}
+    assert isinstance(emulator, RosbridgeEmulator)
+    return {"device": "ridgeback", "url": emulator.url}

@@ -1,0 +1,72 @@
+"""What the operator sees while it runs: one line, rewritten on a terminal, once a second elsewhere; faults whole."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from typing import Any
+
+from robot_io.config import RigConfig
+from safety.faults import FAULTS
+
+
+class LiveLine:
+    """Prints to stderr; never raises when nobody reads."""
+
+    def __init__(self, rig: RigConfig, *, quiet: bool = False) -> None:
+        self._rig = rig
+        self._quiet = quiet
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._last_s = 0.0
+        self._width = 0
+        self._faults: tuple[str, ...] = ()
+
+    def show(self, status: dict[str, Any]) -> None:
+        """Show one status of control."""
+        faults = tuple(status["faults"])
+        for fault in faults:
+            if fault not in self._faults:
+                self.say(f"{fault} {FAULTS[fault].text if fault in FAULTS else ''} -> {status['mode']}")
+        self._faults = faults
+        if self._quiet:
+            return
+        now_s = time.monotonic()
+        if not self._terminal and now_s - self._last_s < 1.0:
+            return
+        self._last_s = now_s
+        line = self._line(status)
+        if self._terminal:
+            self._write(f"\r{line:<{self._width}}")
+            self._width = len(line)
+        else:
+            self._write(line + "\n")
+
+    def say(self, text: str) -> None:
+        """Print a line of its own."""
+        if self._terminal and self._width:
+            self._write("\r" + " " * self._width + "\r")
+            self._width = 0
+        self._write(text + "\n")
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._terminal and self._width:
+            self._write("\n")
+            self._width = 0
+
+    def _line(self, status: dict[str, Any]) -> str:
+        fx, fy, _ = status["force_N"]
+        control = self._rig.control
+        return (
+            f"{status['phase']:<9} {status['progress_m']:6.2f}/{control.distance_m:.2f} m"
+            f"  off {status['lateral_m']:+.3f} m  |F| {math.hypot(fx, fy):5.1f}/{self._rig.limits.max_force_N:.0f} N"
+            f"  theta_p {math.degrees(status['theta_p']):+6.1f} deg  v {status['speed']:.2f} m/s  {status['mode']}"
+        )
+
+    def _write(self, text: str) -> None:
+        try:
+            sys.stderr.write(text)
+            sys.stderr.flush()
+        except (OSError, AttributeError, ValueError):
+            return

@@ -1,0 +1,147 @@
+"""`push replay LOG`: prove that the program of today does, bit for bit, what the log says it did."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import platform
+from pathlib import Path
+from typing import Any
+
+from robot_io.error_report import say_json, tell
+from robot_io.errors import ReplayDiffers, UsageError
+from tools.replay import Difference, ReplayResult, load, replay, ticks_of
+
+DIFFERS = ReplayDiffers.exit_code
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `push replay`."""
+    parser.add_argument("log", help="run.mcap, or a run's folder")
+    parser.add_argument(
+        "--what-if", action="append", default=[], metavar="KEY=VALUE", help="other settings over the same inputs"
+    )
+    parser.add_argument("--tolerance", type=float, metavar="X", help="accept numbers this close (another machine)")
+    parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Replay; 0 identical, 7 different. Raises LogDamaged (8) for a log that cannot be trusted."""
+    path = Path(args.log)
+    if path.is_dir():
+        path = path / "run.mcap"
+    if args.tolerance is not None and not args.tolerance >= 0.0:
+        raise UsageError(f"--tolerance {args.tolerance} is not a distance", where="push replay", do="Give 0 or more")
+    if args.what_if:
+        return what_if(path, args)
+    result = replay(path, tolerance=args.tolerance)
+    different = result.identical < result.ticks or (
+        result.world is not None and result.world.identical < result.world.states
+    )
+    show = tell if args.json else print
+    show(f"replay: {result.identical} of {result.ticks} ticks identical")
+    if result.world is not None:
+        show(f"world: {result.world.identical} of {result.world.states} states identical")
+    if result.gaps:
+        show(f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)")
+    for name, found in (
+        ("tick", result.first_difference),
+        ("world state", result.world and result.world.first_difference),
+    ):
+        if found is not None:
+            show(
+                f"first difference: {name} {found.tick}, {found.field}: logged {found.logged!r}, now {found.replayed!r}"
+            )
+    if different:
+        for line in machine_differences(result.facts):
+            show(line)
+    if args.json:
+        say_json(as_json(result))
+    return DIFFERS if different else 0
+
+
+def as_json(result: ReplayResult) -> dict[str, Any]:
+    """Return the result as the `--json` object."""
+    world = result.world
+    return {
+        "schema": 1,
+        "ticks": result.ticks,
+        "identical": result.identical,
+        "gaps": result.gaps,
+        "first_difference": _plain(result.first_difference),
+        "world": None
+        if world is None
+        else {
+            "states": world.states,
+            "identical": world.identical,
+            "first_difference": _plain(world.first_difference),
+        },
+        "machine_differences": machine_differences(result.facts),
+    }
+
+
+def machine_differences(facts: dict[str, str]) -> list[str]:
+    """Return what differs between the machine of the log and this one, in words."""
+    now = {
+        "python": platform.python_version(),
+        "libm": " ".join(platform.libc_ver()),
+        "machine": platform.machine(),
+    }
+    return [
+        f"{name} was {facts[name]}, is {value}" for name, value in now.items() if name in facts and facts[name] != value
+    ]
+
+
+def what_if(path: Path, args: argparse.Namespace) -> int:
+    """Fold the log's inputs with other settings and say what the law would have commanded."""
+    from robot_io.config import rig_from_toml, rig_to_toml
+    from tools.tick_core import TickCore
+
+    _, rig, facts = load(path)
+    other = rig_from_toml(rig_to_toml(rig), overrides=args.what_if)
+    in_contact = facts.get("in_contact") == "True"
+    core = TickCore.of(other, in_contact=in_contact)
+    state = None
+    count = changed = 0
+    worst = 0.0
+    worst_tick = -1
+    for tick in ticks_of(path, facts):
+        state, output = core.fold(tick.before if state is None else state, tick.input)
+        old, new = tick.output.wanted_world, output.wanted_world
+        off = math.hypot(old.vx - new.vx, old.vy - new.vy)
+        count += 1
+        changed += off > 0.0
+        if off > worst:
+            worst, worst_tick = off, tick.input.tick
+    show = tell if args.json else print
+    show(f"what if {', '.join(args.what_if)}: commands the law would have given; the world did not answer")
+    show(f"{changed} of {count} ticks would differ, at most by {worst:.4f} m/s (tick {worst_tick})")
+    if args.json:
+        say_json(
+            {
+                "schema": 1,
+                "what_if": args.what_if,
+                "ticks": count,
+                "changed": changed,
+                "worst_m_per_s": worst,
+                "worst_tick": worst_tick,
+            }
+        )
+    return 0
+
+
+def _plain(found: Difference | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "tick": found.tick,
+        "field": found.field,
+        "logged": _number(found.logged),
+        "replayed": _number(found.replayed),
+    }
+
+
+def _number(value: Any) -> Any:
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value)
+    return value if isinstance(value, str | int | float | bool | list) or value is None else repr(value)

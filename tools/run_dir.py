@@ -1,0 +1,46 @@
+"""The folder of a run: created, never overwritten."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+from robot_io.config import RigConfig, rig_to_toml
+from robot_io.errors import UsageError
+
+RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
+
+
+def create(out: str | None, rig_name: str) -> Path:
+    """Create and return the run's folder (default: `runs/RIG-TIME`).
+
+    Raises UsageError when it already holds a run, or cannot be made.
+    """
+    path = Path(out) if out else Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    if any((path / name).exists() for name in RUN_FILES):
+        raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise UsageError(
+            f"the run's folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
+        ) from None
+    return path
+
+
+def write_config(path: Path, rig: RigConfig) -> str:
+    """Write the resolved rig to `config.toml` and return its text."""
+    text = rig_to_toml(rig)
+    (path / "config.toml").write_text(text, encoding="utf-8")
+    return text
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write a JSON file whole or not at all."""
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    part.replace(path)
