@@ -121,15 +121,17 @@ class Ft300(DriverBase):
         """Return all new samples, oldest first: N and N*m in the SENSOR frame. Never blocks, never raises.
 
         Of n packets found at once the k-th is stamped (n-1-k)*10 ms before the newest, but never before its
-        predecessor. At most 512 samples come at once; older ones are dropped and counted as `overflow`.
+        predecessor. At most 512 samples come at once; older ones are dropped, counted as `overflow`,
+        and missing in `seq`.
         """
         if self._streaming and self._line is not None and self._state is LinkState.UP:
             try:
                 self._collect(self._line)
             except LINE_ERRORS as error:
                 self._lose(error)
-        samples, self._held = tuple(self._held), []
-        return samples
+        samples, self._held = self._held, []
+        self._counted["overflow"] += max(len(samples) - MAX_SAMPLES_PER_DRAIN, 0)
+        return tuple(samples[-MAX_SAMPLES_PER_DRAIN:])
 
     def health(self) -> DeviceHealth:
         """Return link state, its cause, counters, and the rate over the last 100 samples (0 after 1 s without)."""
@@ -217,8 +219,6 @@ class Ft300(DriverBase):
             now_ns = self._clock()
             self._counted["empty_reads"] += not found
             self._counted["bursts"] += len(found) > 1
-            self._counted["overflow"] += max(len(found) - MAX_SAMPLES_PER_DRAIN, 0)
-            found = found[-MAX_SAMPLES_PER_DRAIN:]
             for newer, counts in zip(range(len(found) - 1, -1, -1), found, strict=True):
                 self._counted["beyond_range"] += beyond_range(counts)
                 self._hold(wrench_from_counts(counts), max(now_ns - newer * PERIOD_NS, self._last_ns))
