@@ -1,0 +1,271 @@
+"""Links that freeze, die, swallow and poison: what reaches the base afterwards, and what the driver says."""
+
+import itertools
+import json
+import os
+import signal
+import time
+
+import pytest
+import websocket
+
+from robot_io.base_feed import BasePose, CommandEcho
+from robot_io.config import TopicsConfig
+from robot_io.messages import BodyTwist, LinkState, Pose2D
+from robot_io.ridgeback import FRESH_NS, LINK_STALE_NS, Ridgeback
+from tests.wire.bridge_process import Bridge, running_bridge, until
+
+FORWARD = BodyTwist(0.1, 0.0, 0.0)
+TOPICS = TopicsConfig(status="")  # the status comes once a second, and start waits for it
+MS = 1_000_000
+
+
+def drive(base: Ridgeback, seconds: float) -> list[tuple[int, BodyTwist]]:
+    """Command every 10 ms for a while; return when what was really sent."""
+    sent = []
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        base.drain()
+        twist = base.command(FORWARD)
+        sent.append((time.monotonic_ns(), twist))
+        time.sleep(0.01)
+    return sent
+
+
+def drive_until_lost(base: Ridgeback) -> list[tuple[int, BodyTwist]]:
+    sent: list[tuple[int, BodyTwist]] = []
+
+    def lost() -> bool:
+        sent.extend(drive(base, 0.02))
+        return base.health().state == LinkState.LOST
+
+    assert until(lost, every_s=0)
+    return sent
+
+
+def moving(heard: list[tuple[int, float, float, float]], since_ns: int) -> list[tuple[int, float, float, float]]:
+    return [entry for entry in heard if entry[0] >= since_ns and entry[1:] != (0.0, 0.0, 0.0)]
+
+
+@pytest.fixture
+def bridge():
+    with running_bridge() as running:
+        yield running
+
+
+def test_a_frozen_bridge_gets_nothing_old_to_deliver(bridge: Bridge):
+    base = Ridgeback(bridge.url, topics=TOPICS)
+    closing: list[int] = []
+    base.before_close = closing.append
+    with base:
+        drive(base, 0.3)
+        fd = base.fileno()
+        froze_ns = bridge.do("freeze", 1.0)
+        sent = drive_until_lost(base)
+        lost_ns = sent[-1][0]
+        assert closing == [fd]
+        assert 0 < lost_ns - froze_ns < LINK_STALE_NS + 500 * MS
+        assert "0.3 s" in base.health().cause
+        last_moving = max(t for t, twist in sent if twist != BodyTwist())
+        assert last_moving - froze_ns < FRESH_NS + 150 * MS
+        assert base.health().counters["held_back"] > 0
+        assert base.command(FORWARD) == BodyTwist()  # never by itself
+        assert base.drain() == ()
+    heard = bridge.heard()
+    assert until(lambda: bridge.report()["now_ns"] > froze_ns + 1_100 * MS)
+    late = moving(bridge.heard(), froze_ns + 5 * MS)
+    assert len(late) <= 1  # the worker may have had one in hand
+    assert len(heard) > 10
+    assert until(lambda: bridge.report()["clients"] == 0)
+
+
+def test_the_same_freeze_bursts_for_a_client_without_these_precautions(bridge: Bridge):
+    # The hazard is real in the emulator, or the test above would prove nothing.
+    naive = websocket.create_connection(bridge.url, timeout=1)
+    naive.send(json.dumps({"op": "advertise", "topic": "/cmd_vel", "type": "geometry_msgs/Twist"}))
+    froze_ns = bridge.do("freeze", 0.6)
+    command = json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 0.1}}})
+    for _ in range(40):
+        naive.send(command)
+        time.sleep(0.01)
+    assert until(lambda: len(moving(bridge.heard(), froze_ns + 590 * MS)) == 40)
+    times = [entry[0] for entry in moving(bridge.heard(), froze_ns)]
+    assert times[-1] - times[0] < 100 * MS
+    naive.close()
+
+
+def test_a_stopped_process_bursts_nothing_either(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        drive(base, 0.3)
+        stopped_ns = time.monotonic_ns()
+        os.kill(bridge.process.pid, signal.SIGSTOP)
+        drive_until_lost(base)
+        os.kill(bridge.process.pid, signal.SIGCONT)
+        resumed_ns = time.monotonic_ns()
+        assert until(lambda: bridge.report()["clients"] == 0)
+    assert len(moving(bridge.heard(), stopped_ns + 20 * MS)) <= 1
+    assert resumed_ns - stopped_ns > LINK_STALE_NS
+
+
+def test_killed_bridge_is_lost_at_once(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        drive(base, 0.2)
+        killed_ns = bridge.do("kill")
+        sent = drive_until_lost(base)
+        assert sent[-1][0] - killed_ns < LINK_STALE_NS  # by the reset, not by silence
+        assert base.health().cause
+        assert base.fileno() == -1
+        base.stop()
+    assert until(lambda: bridge.report()["velocity"] == [0.0, 0.0, 0.0])  # the base's own timeout
+
+
+def test_a_restarted_bridge_is_not_rejoined_by_itself(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        drive(base, 0.2)
+        bridge.do("restart", 0.1)
+        drive_until_lost(base)
+        restarted_ns = bridge.report()["now_ns"] + 150 * MS
+        drive(base, 0.5)
+        assert base.health().state == LinkState.LOST
+        assert moving(bridge.heard(), restarted_ns) == []
+        with base:  # asked for, it comes back
+            assert base.command(FORWARD) == FORWARD
+
+
+def test_half_open_link_is_given_up(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        drive(base, 0.2)
+        pong_ns = base.newest_pong_ns
+        began_ns = bridge.do("half_open")
+        sent = drive_until_lost(base)
+        assert LINK_STALE_NS - 50 * MS < sent[-1][0] - began_ns < LINK_STALE_NS + 500 * MS
+        assert base.newest_pong_ns - pong_ns < 300 * MS
+    assert until(lambda: bridge.report()["velocity"] == [0.0, 0.0, 0.0])
+    assert moving(bridge.heard(), began_ns + 10 * MS) == []
+
+
+def test_a_bridge_that_does_not_read_is_given_up_without_blocking(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        bridge.do("stop_reading", 30.0)
+        slowest = 0.0
+        for _ in range(200_000):
+            before = time.perf_counter()
+            base.command(FORWARD)
+            slowest = max(slowest, time.perf_counter() - before)
+            base.drain()  # feeds still come: only the outward way is stuck
+            if base.health().state == LinkState.LOST:
+                break
+        assert base.health().state == LinkState.LOST
+        assert "does not read" in base.health().cause
+        assert slowest < 0.5  # it never waited for the 30 s
+
+
+def test_a_poisoned_connection_is_seen_by_the_missing_echo(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        assert until(lambda: bool(drive(base, 0.02)) and base.health().counters["echo"] > 5, every_s=0)
+        link = base._link
+        assert link is not None
+        link.send_text(b'{"op":"publish","topic":"/cmd_vel","msg":{"linear":{"x":0.1,"y":0,"z":0}')
+        assert until(lambda: bool(drive(base, 0.02)) and bridge.report()["counters"].get("poisoned", 0) > 5, every_s=0)
+        base.drain()
+        echoes = base.health().counters["echo"]
+        drive(base, 0.2)
+        assert base.health().state == LinkState.UP  # it looks healthy
+        assert base.health().counters["echo"] == echoes  # but nothing is heard
+    assert until(lambda: bridge.report()["velocity"] == [0.0, 0.0, 0.0])
+
+
+def test_nothing_that_moves_is_sent_when_nobody_drained_for_long(bridge: Bridge):
+    # Without draining the newest message looks old; the driver looks into its socket before it refuses.
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        time.sleep(0.15)
+        assert base.command(FORWARD) == FORWARD
+        assert base.health().counters["held_back"] == 0
+
+
+def test_occlusion_leaves_the_pose_out_and_keeps_the_link(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        bridge.do("occlude_base", 0.4)
+        samples = []
+        end = time.monotonic() + 0.8
+        while time.monotonic() < end:
+            samples += [sample for sample in base.drain() if isinstance(sample.value, BasePose)]
+            time.sleep(0.005)
+        gaps = [b.received_ns - a.received_ns for a, b in itertools.pairwise(samples)]
+        assert max(gaps) > 300 * MS
+        assert base.health().state == LinkState.UP
+
+
+def test_a_pose_jump_comes_through_for_safety_to_judge(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        bridge.do("jump_pose", Pose2D(0.5, 0.0, 0.0), 0.1)
+        seen: list[float] = []
+
+        def jumped() -> bool:
+            seen.extend(s.value.pose.x for s in base.drain() if isinstance(s.value, BasePose))
+            return any(x > 0.4 for x in seen) and seen[-1] < 0.4
+
+        assert until(jumped)
+
+
+def test_lag_shows_in_the_stamps(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+
+        def age() -> float:
+            base.drain()
+            ages: list[float] = []
+            assert until(
+                lambda: bool(
+                    ages.extend(time.time() - s.device_time_s for s in base.drain() if isinstance(s.value, BasePose))
+                    or len(ages) > 10
+                )
+            )
+            return sorted(ages)[len(ages) // 2]
+
+        normal = age()
+        bridge.do("lag", 0.09)
+        assert until(lambda: age() > normal + 0.06)
+        assert base.health().state == LinkState.UP
+
+
+def test_the_joystick_wins(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        drive(base, 0.1)
+        bridge.do("joystick", BodyTwist(0.0, -0.2, 0.0), 0.3)
+        assert until(lambda: bool(drive(base, 0.05)) and bridge.report()["velocity"][1] == -0.2, every_s=0)
+        heard = bridge.heard()
+        joystick = [entry for entry in heard if entry[2] == -0.2]
+        between = [e for e in heard if joystick[0][0] < e[0] < joystick[-1][0]]
+        assert all(entry[2] == -0.2 for entry in between)  # ours are dropped, not mixed in
+        assert bridge.report()["counters"]["commands_masked"] > 0
+        assert until(lambda: bool(drive(base, 0.05)) and bridge.heard()[-1][1] == 0.1, every_s=0)  # and back
+
+
+def test_zero_on_a_new_connection():
+    settings = {"zero_on_new_connection": True}
+    with running_bridge(bridge=settings) as bridge, Ridgeback(bridge.url, topics=TOPICS) as base:
+        drive(base, 0.1)
+        first = next(i for i, entry in enumerate(bridge.heard()) if entry[1] == 0.1)
+        other = websocket.create_connection(bridge.url, timeout=1)
+        other.send(json.dumps({"op": "advertise", "topic": "/cmd_vel", "type": "geometry_msgs/Twist"}))
+
+        def braked() -> bool:
+            drive(base, 0.02)
+            return (0.0, 0.0, 0.0) in [entry[1:] for entry in bridge.heard()[first:]]
+
+        assert until(braked, every_s=0)
+        other.close()
+
+
+def test_echo_comes_from_whoever_commands(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        other = websocket.create_connection(bridge.url, timeout=1)
+        other.send(json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"y": 0.07}}}))
+        echoes: list[BodyTwist] = []
+        assert until(
+            lambda: bool(
+                echoes.extend(s.value.twist for s in base.drain() if isinstance(s.value, CommandEcho))
+                or BodyTwist(0.0, 0.07, 0.0) in echoes
+            )
+        )
+        other.close()
