@@ -182,7 +182,7 @@ class Ur10(DriverBase):
         """Return the link state as the arm's process last said, LOST when that process is gone."""
         record = self.read() or NO_ARM
         state, cause = LinkState(record.link), ""
-        if self._child is None:
+        if self._child is None or self._exit_code is not None:
             state = LinkState.CLOSED
         elif (code := self._child.poll()) is not None:
             state, cause = LinkState.LOST, _how_it_ended(code)

@@ -52,6 +52,10 @@ class ActiveHold:
                 raise DeviceNotReady(
                     "the control script refused the watchdog", where=host, do="Use hold = monitor, or try again."
                 )
+            if not self._command():  # waits until the script is ready; later calls return at once
+                raise DeviceNotReady(
+                    "the control script refused the first target", where=host, do="Use hold = monitor, or try again."
+                )
         except BaseException:
             self.end()
             raise
@@ -61,7 +65,7 @@ class ActiveHold:
         if self._ended or reader.joints is None:
             return ArmError.SERVO_STOPPED
         fault = self._fault(reader, reader.joints, now_ns)
-        if fault == ArmError.NONE and not self._rtde.servoJ(list(self.target), 0.0, 0.0, CYCLE_S, LOOKAHEAD_S, GAIN):
+        if fault == ArmError.NONE and not self._command():
             fault = ArmError.SERVO_STOPPED
         if fault != ArmError.NONE:
             self._ended = True
@@ -77,6 +81,10 @@ class ActiveHold:
         self._rtde.servoStop()
         self._rtde.stopScript()
         signal.setitimer(signal.ITIMER_REAL, 0)
+
+    def _command(self) -> bool:
+        accepted: bool = self._rtde.servoJ(list(self.target), 0.0, 0.0, CYCLE_S, LOOKAHEAD_S, GAIN)
+        return accepted
 
     def _fault(self, reader: ArmReader, joints: JointState, now_ns: int) -> ArmError:
         if reader.error != ArmError.NONE:

@@ -63,15 +63,14 @@ class SimUr10(DriverBase):
 
     def stop(self) -> None:
         """End the flow; nothing is ever commanded."""
-        if self._state != LinkState.CLOSED:
-            self._state = LinkState.OPENING
+        self._state = LinkState.CLOSED
 
     def close(self) -> None:
         """Close; idempotent."""
         self._state = LinkState.CLOSED
 
     def _sample(self, packets: int) -> ArmRecord:
-        at_ns = self._start_ns + round(self._phase_ns + (packets - 1) * self._period_ns)
+        at_ns = self._start_ns + int(self._phase_ns + (packets - 1) * self._period_ns)
         truth = self._source.read_arm(at_ns)
         joints = JointState(
             truth.position,

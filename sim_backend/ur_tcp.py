@@ -14,6 +14,9 @@ _READ_BYTES = 65536
 _QUEUE_LIMIT_BYTES = 4_000_000
 """A client that leaves this much unread is dropped."""
 
+_SEND_BUFFER_BYTES = 65536
+"""Keeps what a slow client has not read short, so that dropping begins soon."""
+
 
 class TcpClient:
     """One accepted connection with a queue of bytes still to send. Subclasses implement `on_bytes`."""
@@ -168,6 +171,7 @@ class TcpServer:
             return
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
         self.accepted += 1
         self.clients.add(self._make_client(self, sock))
 

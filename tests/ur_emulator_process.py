@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 READY_WITHIN_S = 10.0
@@ -124,8 +124,11 @@ def main() -> None:
             value = value[part] if isinstance(value, dict) else getattr(value, part)
         return value(*question["args"]) if "call" in question else value
 
+    def plain(value: Any) -> Any:
+        return list(value) if isinstance(value, Iterable) else repr(value)
+
     def say(value: Any) -> None:
-        print(json.dumps(value, default=list), flush=True)
+        print(json.dumps(value, default=plain), flush=True)
 
     loop.add_fd(0, on_command)
     say("ready")

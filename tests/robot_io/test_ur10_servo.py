@@ -1,0 +1,158 @@
+"""Active holding: begins only when safe, corrects drift, and is over for good with the first fault."""
+
+import os
+import signal
+
+import pytest
+
+from robot_io.arm_record import ArmError
+from robot_io.errors import DeviceNotReady
+from robot_io.ur10 import Ur10
+from tests.ur_emulator_process import EmulatorProcess, wait_until
+
+HELD = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31)
+DRIFT = [0.005, -0.005, 0.005, -0.005, 0.005, -0.005]
+
+
+@pytest.fixture
+def robot():
+    with EmulatorProcess() as emulator:
+        yield emulator
+
+
+@pytest.fixture
+def arm(robot):
+    with Ur10(robot.host, hold="servo", held_pose_rad=HELD) as driver:
+        wait_until(lambda: driver.read().servo, "it holds")
+        yield driver
+
+
+def error_rad(arm: Ur10) -> float:
+    return max(abs(q - held) for q, held in zip(arm.read().joints.position, HELD, strict=True))
+
+
+def test_holds_against_a_step_of_drift(robot, arm) -> None:
+    packets = arm.read().packets
+    robot.call("drift_step", DRIFT)
+    wait_until(lambda: error_rad(arm) > 0.001, "the drift is seen")
+    wait_until(lambda: error_rad(arm) < 0.0002, "and corrected")
+    wait_until(lambda: arm.read().packets > packets + 60, "for a while")
+    assert error_rad(arm) < 0.0002
+    assert arm.read().servo
+    assert arm.read().error == ArmError.NONE
+
+
+def test_the_same_drift_stays_without_active_holding(robot) -> None:
+    with Ur10(robot.host) as arm:
+        robot.call("drift_step", DRIFT)
+        packets = arm.read().packets
+        wait_until(lambda: arm.read().packets > packets + 60, "a while later")
+        assert error_rad(arm) == pytest.approx(0.005)
+        assert not arm.read().servo
+
+
+def test_holds_against_slow_drift(robot, arm) -> None:
+    robot.call("drift_rate", [0.001] * 6)
+    packets = arm.read().packets
+    wait_until(lambda: arm.read().packets > packets + 60, "half a second")
+    assert error_rad(arm) < 0.0002
+
+
+def test_the_watchdog_is_set_before_the_first_target(robot, arm) -> None:
+    assert robot.get("controller.watchdog") is not None
+    assert robot.get("counters.watchdog_trips") == 0
+
+
+def test_ends_cleanly(robot, arm) -> None:
+    arm.stop()
+    wait_until(lambda: robot.get("controller.runtime_state") == 1, "the program has ended")
+    assert robot.get("counters.watchdog_trips") == 0, "by stopScript, not by the watchdog"
+    assert arm.read().error == ArmError.NONE
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_dead_or_frozen_child_is_stopped_by_the_controller(robot, arm, number: signal.Signals) -> None:
+    os.kill(arm.read().child_pid, number)
+    wait_until(lambda: robot.get("counters.watchdog_trips") == 1, "the watchdog acts")
+    assert robot.get("controller.runtime_state") == 1
+
+
+def test_refuses_a_playing_program_and_leaves_it_playing(robot) -> None:
+    robot.call("play_other_program", "theirs")
+    wait_until(lambda: robot.get("controller.runtime_state") == 2, "it plays")
+    with pytest.raises(DeviceNotReady, match="program is playing"):
+        Ur10(robot.host, hold="servo", held_pose_rad=HELD).open()
+    assert robot.get("controller.runtime_state") == 2
+    assert robot.get("controller.program.name") == "theirs"
+    assert robot.get("seen.script_bytes") == 0
+    assert robot.get("seen.input_setups") == 0
+    assert "stop" not in robot.get("seen.dashboard_lines")
+
+
+def test_refuses_a_paused_program(robot) -> None:
+    robot.call("play_other_program", "theirs")
+    wait_until(lambda: robot.get("controller.runtime_state") == 2, "it plays")
+    robot.call("pause_program")
+    with pytest.raises(DeviceNotReady, match="program is playing"):
+        Ur10(robot.host, hold="servo", held_pose_rad=HELD).open()
+    assert robot.get("controller.runtime_state") == 4
+
+
+def test_refuses_another_pose(robot) -> None:
+    robot.call("drift_step", [0, 0, 0.2, 0, 0, 0])
+    with pytest.raises(DeviceNotReady, match=r"0\.200 rad from the held pose"):
+        Ur10(robot.host, hold="servo", held_pose_rad=HELD, held_pose_tolerance_rad=0.05).open()
+    assert robot.get("seen.script_bytes") == 0
+
+
+def test_refuses_a_moving_arm(robot) -> None:
+    robot.call("drift_rate", [0.03, 0, 0, 0, 0, 0])
+    with pytest.raises(DeviceNotReady, match="moving"):
+        Ur10(robot.host, hold="servo").open()
+    assert robot.get("seen.script_bytes") == 0
+
+
+@pytest.mark.long
+def test_a_script_that_does_not_start_is_said(robot) -> None:
+    robot.call("ignore_scripts")
+    with pytest.raises(DeviceNotReady, match="control script"):
+        Ur10(robot.host, hold="servo", held_pose_rad=HELD).open()
+
+
+@pytest.mark.parametrize(
+    ("fault", "error"),
+    [
+        (("protective_stop",), ArmError.SERVO_STOPPED),
+        (("stop_program",), ArmError.SERVO_STOPPED),
+        (("pause_program",), ArmError.SERVO_STOPPED),
+        (("emergency_stop",), ArmError.SERVO_STOPPED),
+        (("drift_step", [0, 0, 0, 0.2, 0, 0]), ArmError.SERVO_NOT_HOLDING),
+        (("nan_joint", 2), ArmError.NOT_FINITE),
+        (("mute",), ArmError.SERVO_STALE),
+        (("close_clients",), ArmError.LINK_LOST),
+    ],
+)
+def test_the_first_fault_ends_it_for_good(robot, arm, fault, error: ArmError) -> None:
+    robot.call(*fault)
+    wait_until(lambda: arm.read().error != ArmError.NONE, "a fault is reported")
+    assert arm.read().error == error
+    assert not arm.read().servo
+    wait_until(lambda: robot.get("controller.runtime_state") == 1, "the controller has stopped the program")
+    started = robot.get("counters.programs_started")
+    if fault[0] != "mute":
+        robot.call("clear_stop")
+    robot.call("resume_program")
+    frames = robot.get("counters.cycles") + 40
+    wait_until(lambda: robot.get("counters.cycles") > frames, "a third of a second later")
+    assert robot.get("counters.programs_started") == started
+    assert robot.get("controller.runtime_state") == 1, "nothing has resumed"
+
+
+def test_a_closed_rtde_connection_does_not_restart_the_script(robot, arm) -> None:
+    """The wheel's own thread would connect again and upload the script once more."""
+    robot.call("close_rtde_clients")
+    wait_until(lambda: arm.read().error != ArmError.NONE, "a fault is reported")
+    frames = robot.get("counters.cycles") + 60
+    wait_until(lambda: robot.get("counters.cycles") > frames, "half a second later")
+    assert robot.get("controller.runtime_state") == 1
+    assert not arm.read().servo
