@@ -250,6 +250,6 @@ def ft_input(
         ),
         int(health.state),
         counters["packets_ok"],
-        counters["crc_fail"],
-        counters["junk_bytes"],
+        counters.get("crc_fail", 0),
+        counters.get("junk_bytes", 0),
     )

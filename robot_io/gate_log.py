@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from robot_io.base_feed import BaseFeed, BaseOdometry, BasePose, BaseReport, SliderPose
 from robot_io.log_channels import CHANNELS, Kind
-from robot_io.log_messages import GateDecision
+from robot_io.log_messages import GateDecision, SafetyEvent
 from robot_io.messages import BodyTwist, Stamped
 from robot_io.ros_messages import (
     Header,
@@ -21,6 +21,7 @@ from robot_io.ros_messages import (
     planar_pose,
     ros_time,
 )
+from robot_io.tick import Mode
 
 WORLD_FRAME, BASE_FRAME = "world", "base_link"
 _UNKNOWN = (0.0,) * 36
@@ -55,11 +56,15 @@ class GateLog:
         """Log what really went out to the base."""
         self._push(Kind.GATE_SENT, now_ns, TwistStamped(self._header(now_ns, BASE_FRAME), _twist(twist)))
 
-    def latched(self, now_ns: int, seq: int, tick: int, verdict: int, text: str) -> None:
-        """Log why the gate latched."""
-        self._push(
-            Kind.GATE_DECISION, now_ns, GateDecision(self._header(now_ns, BASE_FRAME), seq, tick, verdict, True, text)
-        )
+    def latched(self, now_ns: int, seq: int, tick: int, verdict: int, text: str, fault: str) -> None:
+        """Log why the gate latched; `fault` names the row of the fault table ("" for the normal end)."""
+        header = self._header(now_ns, BASE_FRAME)
+        self._push(Kind.GATE_DECISION, now_ns, GateDecision(header, seq, tick, verdict, True, text))
+        if fault:
+            stop = int(Mode.STOP)
+            self._push(
+                Kind.SAFETY_EVENT, now_ns, SafetyEvent(header, tick, "fault", fault, f"gate: {text}", stop, stop)
+            )
 
     def _header(self, at_ns: int, frame: str) -> Header:
         return Header(ros_time(at_ns + self._offset_ns), frame)

@@ -91,6 +91,8 @@ FAULTS: dict[str, Fault] = dict(
         _row("F60-slow", "the loop lost 30 ms or three ticks in a row", Mode.SLOW, _A, 3),
         _row("F63", "the recorder is gone", Mode.HOLD, _L, 100),
         _row("F64", "the operator asked for a stop", Mode.STOP, _L, 1, 130),
+        _row("F65", "control died while the base was moving", Mode.STOP, _L, 5),
+        _row("F66", "control was silent for 50 ms", Mode.STOP, _L, 5),
         _row("F67", "the gate is gone or has latched", Mode.STOP, _L, 1),
         _row("F67-late", "no record from the gate for 100 ms", Mode.STOP, _L, 10),
         _row("F68", "an exception in the loop", Mode.STOP, _L, 0, 1),

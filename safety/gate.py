@@ -42,12 +42,13 @@ class Latch(IntEnum):
     FROZEN_TICK = 9
     OVERSPEED = 10
     LINK = 11
+    EOF_MOVING = 12
 
 
 LATCH_TEXT = {
     Latch.NONE: "not latched",
     Latch.SILENCE: "control was silent for 50 ms",
-    Latch.EOF: "control is gone",
+    Latch.EOF: "control has ended",
     Latch.NONSENSE: "control sent something that is not a frame",
     Latch.SEQUENCE: "a frame of control is missing or doubled",
     Latch.STALE: "control's frame was older than 50 ms",
@@ -57,7 +58,17 @@ LATCH_TEXT = {
     Latch.FROZEN_TICK: "control's tick stands still",
     Latch.OVERSPEED: "the base is faster than the envelope",
     Latch.LINK: "the base link is gone",
+    Latch.EOF_MOVING: "control died while the base was moving",
 }
+
+LATCH_FAULT = {
+    Latch.EOF_MOVING: "F65",
+    Latch.SILENCE: "F66",
+    Latch.STALE: "F66",
+    Latch.OVERSPEED: "F35",
+    Latch.LINK: "F30",
+}
+"""The row of the fault table that a latch stands for; any other is F36, a command that may not pass."""
 
 
 class GateLimits(msgspec.Struct, frozen=True, gc=False):
@@ -111,6 +122,11 @@ def on_speed(limits: GateLimits, state: GateState, twist: BodyTwist) -> GateStat
     count = state.overspeed + 1 if fast else 0
     state = msgspec.structs.replace(state, overspeed=count)
     return latched(state, Latch.OVERSPEED) if count >= OVERSPEED_SAMPLES and not state.latch else state
+
+
+def on_eof(state: GateState) -> GateState:
+    """Latch because control's end of the socket is closed: the normal end, or its death in the middle of a push."""
+    return latched(state, Latch.EOF if state.twist == ZERO else Latch.EOF_MOVING)
 
 
 def latched(state: GateState, cause: Latch) -> GateState:

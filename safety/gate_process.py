@@ -118,7 +118,7 @@ class GateProcess:
 
     def _control_is_gone(self) -> None:
         self._loop.remove_fd(self._control.fileno())
-        self._state = gate.latched(self._state, Latch.EOF)
+        self._state = gate.on_eof(self._state)
         self._end_ns = monotonic_ns() + LAST_ZEROS_NS
 
     def _on_base(self, _events: int) -> None:
@@ -149,7 +149,8 @@ class GateProcess:
             self._told = self._state.latch
             cause = self._base.health().cause if self._told == Latch.LINK else ""
             text = ": ".join(filter(None, (gate.LATCH_TEXT[self._told], cause)))
-            self._log.latched(now_ns, self._state.seq, self._state.tick, int(self._told), text)
+            fault = "" if self._told == Latch.EOF else gate.LATCH_FAULT.get(self._told, "F36")
+            self._log.latched(now_ns, self._state.seq, self._state.tick, int(self._told), text, fault)
             self._status.say("latched", latch=int(self._told), text=text)
             self._publish()
         wanted = gate.due(self._state, now_ns)

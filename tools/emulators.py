@@ -53,16 +53,22 @@ def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, .
     )
 
 
-def open_ridgeback(loop: EventLoop, world: World, rig: RigConfig) -> RosbridgeEmulator:
-    """Open a rosbridge with a Ridgeback behind it, on a free port."""
-    settings = RidgebackSettings(
+def ridgeback_settings(rig: RigConfig) -> RidgebackSettings:
+    """Return how the rig's emulated or simulated base behaves."""
+    return RidgebackSettings(
         topics=rig.base.topics,
         mocap_rate_hz=rig.world.mocap_rate_hz,
         base_phase=rig.world.base_phase,
         base_rate_error=rig.world.base_tick_rate_error,
         base_from_marker=rig.frames.base_from_marker,
     )
-    return RosbridgeEmulator(loop, world, port=0, settings=settings)
+
+
+def open_ridgeback(
+    loop: EventLoop, world: World, rig: RigConfig, host: str = "127.0.0.1", port: int = 0
+) -> RosbridgeEmulator:
+    """Open a rosbridge with a Ridgeback behind it; port 0 takes a free one."""
+    return RosbridgeEmulator(loop, world, port=0, settings=ridgeback_settings(rig))
 
 
 OPENERS: dict[str, Callable[[EventLoop, World, RigConfig], Emulator]] = {

@@ -32,7 +32,7 @@ from robot_io.ring import Ring
 from robot_io.shared_record import SharedRecord
 from robot_io.tick import Vector6
 from robot_io.ur10 import spawn_child
-from safety.gate import GateLimits
+from safety.gate import GateLimits, Latch
 from safety.gate_process import GateJob
 from safety.settings import SafetySettings
 from tools import run_dir
@@ -51,6 +51,8 @@ READY_NS = 9 * NS_PER_S
 """Each device has its own, shorter deadline; this one only catches a process that hangs before it."""
 OTHERS_NS = 4 * NS_PER_S
 """After the first device failed, the others may still say what is wrong with them."""
+FROZEN_NS = NS_PER_S
+"""The gate has latched and control has not spoken for this long: it is frozen, and is killed."""
 PROGRAM_VERSION = "0.1.0"
 
 DEVICE_NAMES = {"ft": "ft300", "arm": "ur10", "base": "ridgeback"}
@@ -71,7 +73,8 @@ class Launcher:
         self._operator_fd = -1
         self._to_close: list[int] = []
         self._offset_ns = wall_offset_ns()
-        self._deadline_ns = 0
+        self._gate_latch = ""
+        self._status_ns = 0
         self.log = out / "run.mcap"
 
     def run(self) -> dict[str, Any]:
@@ -263,8 +266,10 @@ class Launcher:
     def _hear(self, child: Child) -> None:
         for event in child.hear():
             if event.get("event") == "status":
+                self._status_ns = monotonic_ns()
                 self._live.show(event)
-            elif event.get("event") == "latched" and self._children["control"].finished is None:
+            elif event.get("event") == "latched" and event["latch"] != Latch.EOF:
+                self._gate_latch = event["text"]
                 self._live.say(f"gate: {event['text']}")
             elif child.name == "recorder" and event.get("event") == "error":
                 self._live.say(f"recorder: {event['what']}")
@@ -297,13 +302,19 @@ class Launcher:
         control = self._children["control"]
         while control.process.poll() is None:
             self._loop.run_once(50)
+            if self._gate_latch and monotonic_ns() - self._status_ns > FROZEN_NS:
+                control.process.kill()  # the base has its zeros; a frozen control would only hide the end
         self._hear(control)
         self._live.end()
         if control.finished is None:
             code = control.process.returncode
             how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+            words = control.last_words()
             raise SafetyStop(
-                f"the control process {how}; the gate stopped the base", where="control", do=control.last_words()
+                f"the control process {how}{f' ({words})' if words else ''}; the gate stopped the base"
+                f"{f': {self._gate_latch}' if self._gate_latch else ''}",
+                where="control",
+                do=f"Its log is complete: push replay {self._out}",
             )
         figures: dict[str, Any] = control.finished
         return figures

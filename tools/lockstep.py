@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
-from sim_backend.sim_ridgeback import SimRidgeback
 
 from control.loop import ft_input
 from control.run_notes import RunNotes, outcome
@@ -30,9 +29,11 @@ from safety import gate
 from safety.gate import GateLimits, GateState
 from safety.settings import SafetySettings
 from sim_backend.sim_ft300 import SimFt300
+from sim_backend.sim_ridgeback import SimRidgeback
 from sim_backend.sim_ur10 import SimUr10
 from sim_backend.world import World
 from tools.control_process import first_state
+from tools.emulators import ridgeback_settings
 from tools.launcher import PROGRAM_VERSION
 from tools.run_log import RunLog
 from tools.tick_core import TickCore, tick_message
@@ -64,7 +65,9 @@ class Lockstep:
             self.world, self._clock, rate_hz=sensor.rate_hz, phase=sensor.phase, latency_ms=sensor.latency_ms
         )
         self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_rate_hz, phase=world.arm_phase)
-        self._base = SimRidgeback(self.world, self._clock, pose_rate_hz=world.mocap_rate_hz)
+        self._base = SimRidgeback(
+            self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
+        )
         self._core = TickCore.of(rig, in_contact=saved_bias is not None)
         self._state = first_state(saved_bias)
         settings = SafetySettings.of(rig)

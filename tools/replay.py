@@ -112,6 +112,8 @@ def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
         state = after if tolerance is None else tick.after
         last = tick.input.tick
         count += 1
+    if count == 0:
+        raise LogDamaged("the log holds no tick", where=str(path), do="The run ended before its loop began")
     return ReplayResult(count, identical, gaps, first, replay_world(path, rig), facts)
 
 

@@ -44,14 +44,13 @@ def run(args: argparse.Namespace) -> int:
         show(f"world: {result.world.identical} of {result.world.states} states identical")
     if result.gaps:
         show(f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)")
-    for name, found in (
-        ("tick", result.first_difference),
-        ("world state", result.world and result.world.first_difference),
-    ):
+    differences: list[tuple[str, Difference | None]] = [("tick", result.first_difference)]
+    if result.world is not None:
+        differences.append(("world state", result.world.first_difference))
+    for name, found in differences:
         if found is not None:
-            show(
-                f"first difference: {name} {found.tick}, {found.field}: logged {found.logged!r}, now {found.replayed!r}"
-            )
+            values = f"logged {found.logged!r}, now {found.replayed!r}"
+            show(f"first difference: {name} {found.tick}, {found.field}: {values}")
     if different:
         for line in machine_differences(result.facts):
             show(line)
