@@ -14,14 +14,24 @@ import signal
 from collections.abc import Iterator
 from types import FrameType
 
+from robot_io.clock import monotonic_ns
 from robot_io.error_report import say_json
 from robot_io.errors import UsageError
 from robot_io.event_loop import EventLoop
 from robot_io.process import set_timer_slack_1ns
-from sim_backend.plant import ArmSource, FtSource
+from sim_backend.ft300_emulator import Ft300Emulator
+from sim_backend.ft300_standalone import ConstantWrench, parse_wrench
+from sim_backend.rosbridge_standalone import standalone_emulator
+from sim_backend.ur_emulator import UrEmulator
+from sim_backend.ur_standalone import StillArm
+from sim_backend.world import World
+from tools.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
+from tools.rig import resolve_rig
 
-Endpoint = dict[str, str]
 ARM_HOST = "127.0.0.10"
+BASE_HOST = "127.0.0.1"
+BASE_PORT = 9090
+"""rosbridge's own default."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,22 +53,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ur.add_argument("--host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST}); one robot per address")
     ur.set_defaults(open_devices=_open_ur10)
 
-    for device in (ft, ur):
+    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server", allow_abbrev=False)
+    base.add_argument("--host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
+    base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 takes a free one ({BASE_PORT})")
+    base.set_defaults(open_devices=_open_ridgeback)
+
+    everything = devices.add_parser("all", help="the three on one simulated world", allow_abbrev=False)
+    everything.add_argument(
+        "rig", nargs="?", default="emulated", help="whose world: a shipped name or a path (emulated)"
+    )
+    everything.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig"
+    )
+    everything.add_argument("--seed", type=int, default=0, help="varies the start and the noise (0)")
+    everything.add_argument("--arm-host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST})")
+    everything.add_argument("--base-host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
+    everything.add_argument("--base-port", type=_port, default=BASE_PORT, help=f"0 takes a free one ({BASE_PORT})")
+    everything.set_defaults(open_devices=_open_all)
+
+    for device in (ft, ur, base, everything):
         device.add_argument("--json", action="store_true", help="one JSON line per endpoint on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until SIGTERM or SIGINT; return 0. UsageError for an address that is not loopback, else DeviceError."""
+    """Serve until SIGTERM or SIGINT; return 0. Raises UsageError, ConfigError, EnvironmentFault (address taken)."""
     set_timer_slack_1ns()
     loop = EventLoop()
     with contextlib.closing(loop), contextlib.ExitStack() as opened:
         opened.enter_context(stopped_by_signals(loop))
-        for endpoint in args.open_devices(loop, args, opened):
+        for emulator in args.open_devices(loop, args, opened):
+            where = endpoint(emulator)
             if args.json:
-                say_json(endpoint)
+                say_json(where)
             else:
-                device, where = endpoint.values()
-                print(f"{device:<10} {where}", flush=True)
+                print("  ".join(where.values()), flush=True)
         loop.run()
     return 0
 
@@ -89,37 +117,39 @@ def _note(_number: int, _frame: FrameType | None) -> None:
     """Do nothing: the byte in the wake-up pipe does it."""
 
 
-def _open_ft300(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Endpoint]:
-    from sim_backend.ft300_standalone import ConstantWrench, parse_wrench
-
+def _open_ft300(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
     step_wrench = parse_wrench(args.step_wrench) if args.step_wrench is not None else None
     source = ConstantWrench(parse_wrench(args.wrench), step_after_s=args.step_after_s, step_wrench=step_wrench)
-    return [_serve_ft300(loop, source, opened, latency_ms=args.latency_ms, streaming=args.streaming)]
-
-
-def _open_ur10(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Endpoint]:
-    from sim_backend.ur_standalone import StillArm
-
-    return [_serve_ur10(loop, StillArm(), opened, host=args.host)]
-
-
-def _serve_ft300(
-    loop: EventLoop, source: FtSource, opened: contextlib.ExitStack, *, latency_ms: int, streaming: bool
-) -> Endpoint:
-    from sim_backend.ft300_emulator import Ft300Emulator
-
-    emulator = Ft300Emulator(loop, source, latency_ms=latency_ms, streaming=streaming)
+    emulator = Ft300Emulator(loop, source, latency_ms=args.latency_ms, streaming=args.streaming)
     opened.callback(emulator.close)
     emulator.start()
-    return {"device": "ft300", "port": emulator.port}
+    return [emulator]
 
 
-def _serve_ur10(loop: EventLoop, source: ArmSource, opened: contextlib.ExitStack, *, host: str) -> Endpoint:
-    from sim_backend.ur_emulator import UrEmulator
-
-    emulator = UrEmulator(loop, source, host=host)
+def _open_ur10(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    emulator = UrEmulator(loop, StillArm(), host=args.host)
     opened.callback(emulator.close)
-    return {"device": "ur10", "host": emulator.host}
+    return [emulator]
+
+
+def _open_ridgeback(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    emulator = standalone_emulator(loop, host=args.host, port=args.port)
+    opened.callback(emulator.close)
+    return [emulator]
+
+
+def _open_all(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    rig = resolve_rig(args.rig, args.set)
+    world = World(rig, args.seed, monotonic_ns())
+    emulators: list[Emulator] = []
+    for open_device in (
+        lambda: open_ft300(loop, world, rig),
+        lambda: open_ur10(loop, world, rig, (args.arm_host,)),
+        lambda: open_ridgeback(loop, world, rig, args.base_host, args.base_port),
+    ):
+        emulators.append(open_device())
+        opened.callback(emulators[-1].close)
+    return emulators
 
 
 def _loopback(text: str) -> str:
@@ -133,3 +163,10 @@ def _loopback(text: str) -> str:
             f"{text!r} is not a loopback address", where="command line", do="The emulators listen on 127.x.y.z only"
         )
     return text
+
+
+def _port(text: str) -> int:
+    """Return a TCP port number; UsageError otherwise."""
+    if not (text.isascii() and text.isdigit() and int(text) <= 65535):
+        raise UsageError(f"{text!r} is not a TCP port", where="command line", do="Give 0..65535")
+    return int(text)

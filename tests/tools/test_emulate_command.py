@@ -16,6 +16,7 @@ from pathlib import Path
 import minimalmodbus
 import pytest
 import serial
+import websocket
 
 from tools import cli
 
@@ -86,6 +87,38 @@ def test_two_robots_side_by_side():
         assert rtde_version_accepted("127.0.42.2")
 
 
+def test_ridgeback_is_found_by_a_plain_client():
+    with emulate("ridgeback", "--port", "0") as (_, [endpoint]):
+        assert endpoint["device"] == "ridgeback"
+        assert endpoint["url"].startswith("ws://127.0.0.1:")
+        client = websocket.create_connection(endpoint["url"], timeout=5.0)
+        with contextlib.closing(client):
+            call = {"op": "call_service", "service": "/rosapi/topic_type", "args": {"topic": "/cmd_vel"}}
+            client.send(json.dumps(call))
+            assert json.loads(client.recv())["values"] == {"type": "geometry_msgs/Twist"}
+
+
+def test_two_bridges_on_one_port_number():
+    with emulate("ridgeback", "--host", "127.0.42.5", "--port", "9191") as (_, one):
+        assert one == [{"device": "ridgeback", "url": "ws://127.0.42.5:9191"}]
+        with emulate("ridgeback", "--host", "127.0.42.6", "--port", "9191") as (_, two):
+            assert two == [{"device": "ridgeback", "url": "ws://127.0.42.6:9191"}]
+
+
+def test_all_share_one_world():
+    """The sensor of the world reads tool weight and bias: not zero, and not what `ft300` alone reads."""
+    argv = ("all", "emulated", "--seed", "3", "--arm-host", "127.0.42.7", "--base-port", "0")
+    with emulate(*argv, lines=3) as (child, endpoints):
+        ft, ur, base = endpoints
+        assert [endpoint["device"] for endpoint in endpoints] == ["ft300", "ur10", "ridgeback"]
+        forces = [value / 100.0 for value in registers_of(ft["port"])[:3]]
+        assert max(abs(force) for force in forces) > 10.0
+        assert rtde_version_accepted(ur["host"])
+        websocket.create_connection(base["url"], timeout=5.0).close()
+        child.send_signal(signal.SIGTERM)
+        assert child.wait(timeout=10) == 0
+
+
 def test_a_taken_address_is_one_sentence():
     with emulate("ur10", "--host", "127.0.42.3"):
         second = subprocess.run(
@@ -116,6 +149,9 @@ def test_a_signal_ends_it_with_0_and_frees_the_ports(number):
         ["ur10", "--host", "localhost"],
         ["ridgeback", "--host", "::1"],
         ["ridgeback", "--port", "70000"],
+        ["all", "nonsense"],
+        ["all", "--set", "world.slider.mass_kg=-1"],
+        ["all", "--base-host", "10.0.0.1"],
         ["ft300", "--wrench=1,2,3"],
         ["ft300", "--wrench=1,2,3,4,5,nan"],
         ["ft300", "--step-after-s", "1"],
