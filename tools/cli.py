@@ -55,7 +55,7 @@ COMMANDS = {
     "sweep": Command(
         "tools.sweep",
         "many simulated pushes, and the paper's figures",
-        ("push sweep --quick", "push sweep --json"),
+        ("push sweep --out sweeps/paper", "push sweep my-grid.toml --out sweeps/mine --resume"),
     ),
     "tune": Command("tools.tune", "map of the gains over simulated pushes", ("push tune", "push tune --json")),
     "doctor": Command(

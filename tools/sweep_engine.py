@@ -1,0 +1,93 @@
+"""Runs a study's items on this machine's cores, or on a Dask cluster, and hands each result over as it comes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from robot_io.errors import EnvironmentFault, UsageError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+SCHEDULER_TIMEOUT_S = 5.0
+
+
+def default_workers() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+@contextlib.contextmanager
+def engine(name: str, scheduler: str | None) -> Iterator[None]:
+    """Make joblib send its work to the named engine: `joblib` (processes here) or `dask` (a running scheduler).
+
+    Raises UsageError for `dask` without a scheduler, EnvironmentFault when the package or the scheduler is not there.
+    """
+    if name == "joblib":
+        if scheduler:
+            raise UsageError("--scheduler belongs to --engine dask", do="Add --engine dask")
+        yield
+        return
+    if not scheduler:
+        raise UsageError("--engine dask needs the scheduler's address", do="Add --scheduler tcp://HOST:PORT")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise EnvironmentFault(
+            "dask.distributed is not installed", do="Install it with: .venv/bin/pip install -e '.[cluster]'"
+        ) from None
+    import joblib
+
+    try:
+        client = Client(scheduler, timeout=SCHEDULER_TIMEOUT_S, set_as_default=True)
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise EnvironmentFault(
+            f"no Dask scheduler answers: {reason}", where=scheduler, do="Start one with `dask scheduler`"
+        ) from None
+    with client, joblib.parallel_config("dask", wait_for_workers_timeout=SCHEDULER_TIMEOUT_S):
+        yield
+
+
+def run_items(
+    function: Callable[[Item], Result], items: Sequence[tuple[int, Item]], workers: int, *, local: bool
+) -> Iterator[tuple[int, Result]]:
+    """Yield (number, function(item)) as the items finish, in any order. `local`: on this machine's cores.
+
+    One worker needs no other process. Leaving early (an error, Ctrl-C) ends the worker processes.
+    """
+    if local and (workers == 1 or len(items) <= 1):
+        for number, item in items:
+            yield number, function(item)
+        return
+    import joblib
+
+    pool: Any = joblib.Parallel(
+        n_jobs=workers if local else -1, batch_size=1, return_as="generator_unordered", pre_dispatch="2*n_jobs"
+    )
+    with warnings.catch_warnings():
+        # leaving early is meant: joblib warns that it cancels what is under way
+        warnings.simplefilter("ignore", UserWarning)
+        results = pool(joblib.delayed(_numbered)(function, number, item) for number, item in items)
+        try:
+            yield from results
+        except BaseException:
+            if local:
+                _end_workers()
+            raise
+        finally:
+            results.close()
+
+
+def _numbered(function: Callable[[Item], Result], number: int, item: Item) -> tuple[int, Result]:
+    return number, function(item)
+
+
+def _end_workers() -> None:
+    from joblib.externals.loky import get_reusable_executor
+
+    get_reusable_executor().shutdown(wait=True, kill_workers=True)

@@ -1,0 +1,190 @@
+"""What a simulation study runs: one case's parameters, and the grid or Monte Carlo file that makes many of them.
+
+A grid file is TOML: `[fixed]` sets parameters for all cases, `[grid]` lists values of which every combination is
+run (the last key varies fastest), `[random]` draws `samples` cases, its `[random.ranges]` uniform between two numbers.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from robot_io import toml_text
+from robot_io.config import NonNegative, Positive, Table
+from robot_io.errors import ConfigError
+from robot_io.table_check import build
+from robot_io.toml_text import Origins
+from sim_backend.lanes import Lane, Timing
+from sim_backend.slider import Circle, Rectangle, pressure_distance_m
+
+MOST_CASES = 1_000_000
+
+
+class Case(Table, frozen=True):
+    """Parameters of one simulated push, as a grid file names them (a `square` has the side `length_m`)."""
+
+    shape: Literal["square", "rectangle", "circle"] = "square"
+    length_m: Positive = 1.0
+    width_m: Positive = 1.0
+    radius_m: Positive = 0.5
+    pressure: Literal["uniform", "rim", "point"] = "uniform"
+    tau_max_Nm: NonNegative = 0.0
+    """Greatest friction torque of the floor; 0: from `pressure`."""
+    f_max_N: Positive = 1.0
+    contact_friction: Annotated[float, Meta(ge=0, le=10)] = 0.5
+    y0_m: float = 0.0
+    phi0_rad: Annotated[float, Meta(ge=-math.pi, le=math.pi)] = 0.0
+    s0_m: float = 0.0
+    k_f: Annotated[float, Meta(ge=0, le=10)] = 0.1
+    k_y_rad_per_m: Annotated[float, Meta(ge=0, le=10)] = 0.01
+    speed_m_per_s: Positive = 0.1
+    controller: Literal["force", "open-loop"] = "force"
+
+
+class TimeTable(Table, frozen=True):
+    """How long each push lasts, its step, and how often its state is kept."""
+
+    dt_s: Positive = 0.01
+    duration_s: Positive = 600.0
+    record_s: Positive = 10.0
+
+
+class RandomTable(Table, frozen=True):
+    """Monte Carlo: so many cases, each of `ranges` drawn uniformly between its two numbers."""
+
+    samples: Annotated[int, Meta(ge=1, le=MOST_CASES)]
+    ranges: dict[str, tuple[float, float]]
+    seed: int = 0
+
+
+class GridFile(Table, frozen=True):
+    """A study as a file."""
+
+    name: Annotated[str, Meta(pattern="^[A-Za-z0-9._-]+$")] = "grid"
+    fixed: Case = Case()
+    grid: dict[str, list[Any]] = msgspec.field(default_factory=dict)
+    time: TimeTable = TimeTable()
+    random: dict[str, Any] = msgspec.field(default_factory=dict)
+
+
+class Study(msgspec.Struct, frozen=True):
+    """A named list of cases and their common time."""
+
+    name: str
+    cases: tuple[Case, ...]
+    timing: Timing
+
+
+def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None) -> Study:
+    """Read a grid file, with `changes` laid over its `[fixed]` table and its step replaced by `dt_s`.
+
+    Raises ConfigError naming the line of the first mistake, or an empty grid.
+    """
+    name = str(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"this grid cannot be read: {error}", where=name, do="Give `paper` or a TOML file") from None
+    data, origins = toml_text.parse(text, name)
+    file = build(GridFile, data, origins, name)
+    fixed = {**data.get("fixed", {}), **changes}
+    clash = sorted(set(changes) & (set(file.grid) | set(file.random.get("ranges", {}))))
+    if clash:
+        raise ConfigError(
+            f"the grid varies {clash[0]}, which the command line fixes", where=name, do="Drop one of them"
+        )
+    draws = _draws(file, origins, name)
+    combinations = _combinations(file, origins, name)
+    if not file.grid and not file.random:
+        raise ConfigError("this grid varies nothing", where=name, do="Add a [grid] or a [random] table")
+    if len(draws) * len(combinations) > MOST_CASES:
+        raise ConfigError(f"this grid has {len(draws) * len(combinations)} cases, more than {MOST_CASES}", where=name)
+    cases = tuple(
+        msgspec.convert({**fixed, **combination, **draw}, Case) for combination in combinations for draw in draws
+    )
+    for case in cases:
+        lane_of(case)  # an impossible slider is found before anything runs
+    return Study(file.name, cases, timing_of(file.time, dt_s, name))
+
+
+def _combinations(file: GridFile, origins: Origins, name: str) -> list[dict[str, Any]]:
+    for key, values in file.grid.items():
+        where = origins.get(("grid", key), name)
+        if not values:
+            raise ConfigError(f"the grid gives no values for `{key}`", where=where, do="List at least one")
+        for value in values:
+            _check_parameter(key, value, where)
+    return [dict(zip(file.grid, values, strict=True)) for values in itertools.product(*file.grid.values())]
+
+
+def _draws(file: GridFile, origins: Origins, name: str) -> list[dict[str, Any]]:
+    if not file.random:
+        return [{}]
+    table = build(RandomTable, file.random, {k[1:]: v for k, v in origins.items() if k[0] == "random"}, name)
+    for key, (low, high) in table.ranges.items():
+        where = origins.get(("random", "ranges", key), name)
+        _check_parameter(key, low, where)
+        _check_parameter(key, high, where)
+        if low > high:
+            raise ConfigError(f"the range of `{key}` ends below its start", where=where)
+    dice = random.Random(table.seed)
+    return [{key: dice.uniform(*ends) for key, ends in table.ranges.items()} for _ in range(table.samples)]
+
+
+def _check_parameter(key: str, value: Any, where: str) -> None:
+    """Raise ConfigError unless `key = value` could stand in `[fixed]`."""
+    build(Case, {key: value}, {(key,): where}, where)
+
+
+def timing_of(table: TimeTable, dt_s: float | None = None, where: str = "--dt") -> Timing:
+    """Return steps for a time table; ConfigError unless the step divides the duration and the recording interval."""
+    dt = table.dt_s if dt_s is None else dt_s
+    if not (math.isfinite(dt) and dt > 0):
+        raise ConfigError(f"a step of {dt} s is not a positive, finite time", where=where)
+    counts = [table.duration_s / dt, table.record_s / dt]
+    if any(abs(count - round(count)) > 1e-6 or round(count) < 1 for count in counts):
+        raise ConfigError(
+            f"a step of {dt} s does not divide {table.duration_s:g} s and the {table.record_s:g} s between kept states",
+            where=where,
+        )
+    if counts[0] > 1e8:
+        raise ConfigError(f"{counts[0]:.3g} steps a case are too many", where=where, do="Take a longer step")
+    return Timing(dt, round(counts[0]), round(counts[1]))
+
+
+def lane_of(case: Case) -> Lane:
+    """Return the lane a case means. Raises ConfigError for an impossible slider."""
+    shape = Circle(case.radius_m) if case.shape == "circle" else Rectangle(case.length_m, _width(case))
+    d = case.tau_max_Nm / case.f_max_N if case.tau_max_Nm else pressure_distance_m(shape, case.pressure)
+    round_ = case.shape == "circle"
+    return Lane(
+        round=round_,
+        reach_m=case.radius_m if round_ else case.length_m / 2,
+        half_width_m=case.radius_m if round_ else _width(case) / 2,
+        d_m=d,
+        contact_friction=case.contact_friction,
+        y0_m=case.y0_m,
+        phi0_rad=case.phi0_rad,
+        s0_m=case.s0_m,
+        k_f=case.k_f,
+        k_y_rad_per_m=case.k_y_rad_per_m,
+        speed_m_per_s=case.speed_m_per_s,
+        f_max_N=case.f_max_N,
+        open_loop=case.controller == "open-loop",
+    )
+
+
+def _width(case: Case) -> float:
+    return case.length_m if case.shape == "square" else case.width_m
+
+
+def product(**values: Sequence[Any]) -> list[dict[str, Any]]:
+    """Return every combination of the named values, the last name varying fastest."""
+    return [dict(zip(values, combination, strict=True)) for combination in itertools.product(*values.values())]
