@@ -63,7 +63,7 @@ class ClientSubscription:
         """Send a message, keep it until its time, or drop it."""
         now_ns = monotonic_ns()
         due_ns = self._last_ns + self._spacing_ns
-        if now_ns >= due_ns:
+        if now_ns >= due_ns and not self._waiting:
             self._send_now(message_json, now_ns)
         elif self._queue_length > 0:
             if len(self._waiting) >= self._queue_length:

@@ -52,7 +52,7 @@ class SimRidgeback(DriverBase):
         self._state = LinkState.CLOSED
         self._feeds: dict[str, _Feed] = {}
         self._seq: Counter[str] = Counter()
-        self._echoes: list[Stamped[BaseFeed]] = []
+        self._coming: list[Stamped[BaseFeed]] = []
         self._origin = Pose2D()
         self.newest_inbound_ns = 0
         self.newest_pong_ns = 0
@@ -76,6 +76,7 @@ class SimRidgeback(DriverBase):
             "status": _Feed(now_ns, STATUS_RATE_HZ * speed_up, _STATUS_PHASE),
         }
         self._seq.clear()
+        self._coming.clear()
         self._state = LinkState.UP
 
     def drain(self) -> tuple[Stamped[BaseFeed], ...]:
@@ -84,23 +85,20 @@ class SimRidgeback(DriverBase):
         if self._state != LinkState.UP:
             return ()
         self.newest_pong_ns = now_ns
-        # The world only goes forward: read everything in the order in which it was sampled.
-        due = [(feed.next_ns, kind) for kind, feed in self._feeds.items()]
-        samples = self._echoes
-        self._echoes = []
-        while due:
-            t_ns, kind = min(due)
-            due.remove((t_ns, kind))
+        # The world only goes forward: sample everything in time order, and let it arrive when its latency is over.
+        while self._feeds:
+            kind = min(self._feeds, key=lambda name: self._feeds[name].next_ns)
             feed = self._feeds[kind]
-            if t_ns + feed.latency_ns > now_ns:
-                continue
-            samples += self._sample(kind, t_ns, t_ns + feed.latency_ns)
-            feed.next_ns = t_ns + feed.period_ns
-            due.append((feed.next_ns, kind))
-        samples.sort(key=lambda sample: sample.received_ns)
-        if samples:
-            self.newest_inbound_ns = samples[-1].received_ns
-        return tuple(samples)
+            if feed.next_ns > now_ns:
+                break
+            self._coming += self._sample(kind, feed.next_ns, feed.next_ns + feed.latency_ns)
+            feed.next_ns += feed.period_ns
+        self._coming.sort(key=lambda sample: sample.received_ns)
+        arrived = [sample for sample in self._coming if sample.received_ns <= now_ns]
+        del self._coming[: len(arrived)]
+        if arrived:
+            self.newest_inbound_ns = arrived[-1].received_ns
+        return tuple(arrived)
 
     def command(self, wanted: BodyTwist) -> BodyTwist:
         """Give the wheels a velocity (BODY frame). Raises ValueError unless finite."""
@@ -110,7 +108,7 @@ class SimRidgeback(DriverBase):
             return BodyTwist()
         self.sent_ns = self._clock()
         self._source.command_base(wanted, self.sent_ns)
-        self._echoes.append(self._stamped("echo", CommandEcho(wanted), self.sent_ns, self.sent_ns))
+        self._coming.append(self._stamped("echo", CommandEcho(wanted), self.sent_ns, self.sent_ns))
         return wanted
 
     def health(self) -> DeviceHealth:
