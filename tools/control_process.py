@@ -20,36 +20,12 @@ from robot_io.ft300 import Ft300
 from robot_io.process import die_with_parent, set_timer_slack_1ns, try_realtime
 from robot_io.ring import Ring
 from robot_io.status_pipe import StatusPipe
-from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState, Vector6
 from robot_io.ur10 import ArmLink
 from tools.jobs import ControlJob
+from tools.run_state import first_state, status_line
 from tools.tick_core import TickCore
 
 PRIORITY = 80
-
-
-def first_state(bias: Vector6 | None) -> TickState:
-    """Return the state a run begins with: untared, or with a bias saved earlier in this power cycle."""
-    if bias is None:
-        return TickState()
-    return TickState(ControlState(tared=True, bias_force=bias[:3], bias_torque=bias[3:]))
-
-
-def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
-    """Return the figures of the live line."""
-    control = state.control
-    return {
-        "tick": inp.tick,
-        "phase": Phase(control.phase).name,
-        "mode": Mode(output.mode).name,
-        "progress_m": round(control.progress_m, 4),
-        "lateral_m": round(control.lateral_m, 4),
-        "force_N": [round(value, 2) for value in control.force_world],
-        "theta_p": round(control.theta_p, 4),
-        "speed": round(control.speed, 4),
-        "faults": list(output.faults),
-        "late_ms": round(inp.host.late_ns * 1e-6, 3),
-    }
 
 
 def main() -> int:

@@ -9,7 +9,7 @@ from robot_io.config import RigConfig
 from robot_io.errors import EnvironmentFault
 from robot_io.event_loop import EventLoop
 from sim_backend.ft300_emulator import Ft300Emulator
-from sim_backend.ridgeback_settings import RidgebackSettings
+from sim_backend.rig_settings import ridgeback_settings
 from sim_backend.rosbridge_emulator import RosbridgeEmulator
 from sim_backend.ur_emulator import UrEmulator
 from sim_backend.world import World
@@ -50,17 +50,6 @@ def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, .
         "no loopback address is free for an emulated UR10",
         where=f"{hosts[0]} to {hosts[-1]}",
         do="Stop other emulators",
-    )
-
-
-def ridgeback_settings(rig: RigConfig) -> RidgebackSettings:
-    """Return how the rig's emulated or simulated base behaves."""
-    return RidgebackSettings(
-        topics=rig.base.topics,
-        mocap_rate_hz=rig.world.mocap_rate_hz,
-        base_phase=rig.world.base_phase,
-        base_rate_error=rig.world.base_tick_rate_error,
-        base_from_marker=rig.frames.base_from_marker,
     )
 
 

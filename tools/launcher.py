@@ -43,6 +43,7 @@ from tools.operator_keys import OperatorKeys
 from tools.recorder import Job as RecorderJob
 from tools.recorder import RingSource
 from tools.rig import devices_at
+from tools.run_facts import level_of, run_facts
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes of a recorder that does not drain."""
@@ -53,7 +54,6 @@ OTHERS_NS = 4 * NS_PER_S
 """After the first device failed, the others may still say what is wrong with them."""
 FROZEN_NS = NS_PER_S
 """The gate has latched and control has not spoken for this long: it is frozen, and is killed."""
-PROGRAM_VERSION = "0.1.0"
 
 DEVICE_NAMES = {"ft": "ft300", "arm": "ur10", "base": "ridgeback"}
 
@@ -161,16 +161,8 @@ class Launcher:
         return child
 
     def _spawn_recorder(self, config_text: str, rings: dict[str, Ring], alive: list[int]) -> None:
-        facts = {
-            "program": f"single-point-push {PROGRAM_VERSION}",
-            "python": platform.python_version(),
-            "libm": " ".join(platform.libc_ver()),
-            "machine": platform.machine(),
-            "kernel": platform.release(),
-            "level": level_of(self._rig),
-            "seed": str(self._seed),
-            "in_contact": str(self._saved_bias is not None),
-        }
+        facts = run_facts(level_of(self._rig), self._seed, in_contact=self._saved_bias is not None)
+        facts["kernel"] = platform.release()
         self._spawn(
             "recorder",
             "tools.recorder",
@@ -361,12 +353,6 @@ class Launcher:
                     self._live.say(f"{child.name}: {words}")
             self._loop.remove_fd(child.status.fd)
             child.close()
-
-
-def level_of(rig: RigConfig) -> str:
-    """Return the level of a run: sim, emulated, hardware or mixed."""
-    levels = {rig.ft.level, rig.arm.level, rig.base.level}
-    return levels.pop() if len(levels) == 1 else "mixed"
 
 
 def combined(failed: list[Child]) -> DeviceError:

@@ -5,12 +5,11 @@ Two runs with the same rig and seed give identical files: log times start at a f
 
 from __future__ import annotations
 
-import platform
 import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from msgspec.structs import replace
 
@@ -23,19 +22,18 @@ from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, VirtualClock
 from robot_io.config import RigConfig
 from robot_io.gate_frame import GateFrame
 from robot_io.gate_log import GateLog
-from robot_io.log_channels import Kind
-from robot_io.tick import TICK_CDR, HostInput, Operator, TickInput, TickOutput, TickState, Vector6
+from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState, Vector6
 from safety import gate
 from safety.gate import GateLimits, GateState
 from safety.settings import SafetySettings
+from sim_backend.rig_settings import ridgeback_settings
 from sim_backend.sim_ft300 import SimFt300
 from sim_backend.sim_ridgeback import SimRidgeback
 from sim_backend.sim_ur10 import SimUr10
 from sim_backend.world import World
-from tools.control_process import first_state
-from tools.emulators import ridgeback_settings
-from tools.launcher import PROGRAM_VERSION
+from tools.run_facts import run_facts
 from tools.run_log import RunLog
+from tools.run_state import first_state
 from tools.tick_core import TickCore, tick_message
 from tools.world_log import into
 
@@ -44,19 +42,32 @@ START_NS = NS_PER_S
 MOST_SECONDS = 4 * 3600.0
 
 
+class LockstepLog(Protocol):
+    """What takes the records of a lockstep run: a `RunLog`, or nothing at all in a sweep."""
+
+    def record(self, kind: int, time_ns: int, payload: bytes) -> None:
+        """Take one ring record."""
+        ...
+
+    def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
+        """Take one tick, encoded and as it is."""
+        ...
+
+
 class Lockstep:
-    """One push in lockstep. `push` is called with each ring record; `run` returns the figures of the end."""
+    """One push in lockstep. `log` gets each record as the rings would; `run` returns the figures of the end."""
 
     def __init__(
         self,
         rig: RigConfig,
         seed: int,
-        push: Callable[[int, int, bytes], object],
+        log: LockstepLog,
         *,
         saved_bias: Vector6 | None = None,
     ) -> None:
         self.rig = rig
-        self._push = push
+        self._log = log
+        push = log.record
         self._clock = VirtualClock(START_NS)
         self._period_ns = round(NS_PER_S / rig.loop.rate_hz)
         self.world = World(rig, seed, START_NS, into(push))
@@ -125,7 +136,8 @@ class Lockstep:
         before = self._state
         after, output = self._core.fold(before, inp)
         self._send(tick, now_ns, output)
-        self._push(Kind.CONTROL_TICK, now_ns, TICK_CDR.encode(tick_message(inp, before, after, output)))
+        message = tick_message(inp, before, after, output)
+        self._log.tick(now_ns, TICK_CDR.encode(message), message)
         self._state = after
         self.notes.note(inp, output)
         return inp, output
@@ -172,15 +184,7 @@ class Lockstep:
 
 def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
     """Open the log of a lockstep run; its facts name nothing that differs from run to run."""
-    facts = {
-        "program": f"single-point-push {PROGRAM_VERSION}",
-        "python": platform.python_version(),
-        "libm": " ".join(platform.libc_ver()),
-        "machine": platform.machine(),
-        "level": "sim",
-        "seed": str(seed),
-        "in_contact": str(in_contact),
-    }
+    facts = run_facts("sim", seed, in_contact=in_contact)
     return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
 
 

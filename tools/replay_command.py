@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import math
-import platform
 from pathlib import Path
 from typing import Any
 
 from robot_io.error_report import say_json, tell
 from robot_io.errors import ReplayDiffers, UsageError
 from tools.replay import Difference, ReplayResult, load, replay, ticks_of
+from tools.run_facts import machine_facts
 
 DIFFERS = ReplayDiffers.exit_code
 
@@ -81,11 +81,7 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
 
 def machine_differences(facts: dict[str, str]) -> list[str]:
     """Return what differs between the machine of the log and this one, in words."""
-    now = {
-        "python": platform.python_version(),
-        "libm": " ".join(platform.libc_ver()),
-        "machine": platform.machine(),
-    }
+    now = machine_facts()
     return [
         f"{name} was {facts[name]}, is {value}" for name, value in now.items() if name in facts and facts[name] != value
     ]

@@ -13,6 +13,8 @@ from robot_io.tick import TickInput, TickOutput, TickState, Vector6
 from tools import run_dir, saved_tare, verdict
 from tools.live_line import LiveLine
 from tools.rig import devices_at, resolve_rig
+from tools.run_facts import level_of
+from tools.run_state import status_line
 from tools.state_dir import RigLock
 
 
@@ -111,7 +113,7 @@ def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
 
 def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Vector6 | None) -> dict[str, Any]:
     """Run the processes of a wall-clock run and return its summary."""
-    from tools.launcher import Launcher, level_of
+    from tools.launcher import Launcher
 
     launcher = Launcher(rig, out, seed=args.seed, saved_bias=saved, live=LiveLine(rig))
     figures = launcher.run()
@@ -137,12 +139,11 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Vecto
 
 def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Vector6 | None) -> dict[str, Any]:
     """Run level sim in this process and return its summary."""
-    from tools.control_process import status_line
     from tools.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
     text = run_dir.write_config(out, rig)
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
-    one = Lockstep(rig, args.seed, log.record, saved_bias=saved)
+    one = Lockstep(rig, args.seed, log, saved_bias=saved)
     stop_on_signals(one)
     live = LiveLine(rig, quiet=args.fast)
     pace = WallPace(1.0 / rig.loop.rate_hz)

@@ -1,0 +1,35 @@
+"""Facts of a run that go into its log: program, machine, level, seed."""
+
+from __future__ import annotations
+
+import platform
+
+from robot_io.config import RigConfig
+
+PROGRAM_VERSION = "0.1.0"
+
+
+def machine_facts() -> dict[str, str]:
+    """Return what can make a replay differ in the last bit: Python, C library, processor."""
+    return {
+        "python": platform.python_version(),
+        "libm": " ".join(platform.libc_ver()),
+        "machine": platform.machine(),
+    }
+
+
+def run_facts(level: str, seed: int, *, in_contact: bool) -> dict[str, str]:
+    """Return the facts of a run; none differs between two runs of the same program on the same machine."""
+    return {
+        "program": f"single-point-push {PROGRAM_VERSION}",
+        **machine_facts(),
+        "level": level,
+        "seed": str(seed),
+        "in_contact": str(in_contact),
+    }
+
+
+def level_of(rig: RigConfig) -> str:
+    """Return the level of a run: sim, emulated, hardware or mixed."""
+    levels = {rig.ft.level, rig.arm.level, rig.base.level}
+    return levels.pop() if len(levels) == 1 else "mixed"
