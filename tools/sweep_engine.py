@@ -14,6 +14,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 SCHEDULER_TIMEOUT_S = 5.0
+CLUSTER_TIMEOUT_S = 60.0
+"""How long a scheduler may be without any worker: clusters start them when they are asked for."""
 
 
 def default_workers() -> int:
@@ -49,8 +51,17 @@ def engine(name: str, scheduler: str | None) -> Iterator[None]:
         raise EnvironmentFault(
             f"no Dask scheduler answers: {reason}", where=scheduler, do="Start one with `dask scheduler`"
         ) from None
-    with client, joblib.parallel_config("dask", wait_for_workers_timeout=SCHEDULER_TIMEOUT_S):
-        yield
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CLUSTER_TIMEOUT_S)
+        except TimeoutError:
+            raise EnvironmentFault(
+                f"the Dask scheduler has no worker after {CLUSTER_TIMEOUT_S:.0f} s",
+                where=scheduler,
+                do=f"Start one with `dask worker {scheduler}`",
+            ) from None
+        with joblib.parallel_config("dask"):
+            yield
 
 
 def run_items(
