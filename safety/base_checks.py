@@ -110,7 +110,8 @@ def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> 
         faults.append("F33")
     zero_ns = inp.now_ns - state.zero_since_ns if state.zero_since_ns else 0
     settled = zero_ns > STOPPING_NS + settings.envelope.speed / BASE_DECELERATION * 1e9
-    moving = settled and speed > MOVING_M_PER_S and state.mode >= Mode.STOP
+    fresh = inp.now_ns - base.odometry_received_ns <= STALE_HOLD_NS  # an old speed says nothing of now
+    moving = settled and fresh and speed > MOVING_M_PER_S and state.mode >= Mode.STOP
     moving_since = (state.moving_since_ns or inp.now_ns) if moving else 0
     if moving_since and inp.now_ns - moving_since > MOVING_NS:
         faults.append("F34")

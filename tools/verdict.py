@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_io.config import RigConfig
+from robot_io.tick import Mode
 from safety.faults import FAULTS
 
 VERDICTS = {
@@ -47,6 +48,7 @@ def summary(
         "phase": figures["phase"],
         "mode": figures["mode"],
         "faults": figures["faults"],
+        "contact_seen": figures["contact_seen"],
         "residual_N": figures["residual_N"],
         "loop": figures["loop"],
         "safety_events": figures["events"],
@@ -80,10 +82,12 @@ def person_lines(summary: dict[str, Any]) -> list[str]:
 
 
 def why(summary: dict[str, Any]) -> str:
-    """Return the faults that ended a run, in words."""
-    reasons = [FAULTS[i].text for i in summary["faults"] if i in FAULTS and FAULTS[i].mode]
+    """Return the faults that ended a run, in words; what only followed from the stop is left out."""
+    stopping = next((event for event in summary["safety_events"] if event["mode"] in ("STOP", "DEAD")), None)
+    faults = stopping["faults"] if stopping else summary["faults"]
+    reasons = [FAULTS[i].text for i in faults if i in FAULTS and FAULTS[i].mode >= Mode.HOLD]
     if not reasons and summary["verdict"] == "contact lost":
-        return "the force did not come back"
+        return "the force did not come back" if summary["contact_seen"] else "nothing was met"
     return "; ".join(reasons) or summary["verdict"]
 
 
