@@ -23,7 +23,7 @@ from robot_io.arm_record import ARM_RECORD_BYTES, ArmError, ArmRecord, pack_arm_
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable, PushError
 from robot_io.messages import LinkState
-from robot_io.process import die_with_parent, set_timer_slack_1ns, try_realtime
+from robot_io.process import die_with_parent, forbid_new_descriptors, set_timer_slack_1ns, try_realtime
 from robot_io.shared_record import SharedRecord
 from robot_io.ur10_preflight import preflight
 from robot_io.ur10_reader import POLL_NS, ArmReader
@@ -118,6 +118,7 @@ def hold_arm(job: ArmJob, record: SharedRecord) -> None:
     hold = None
     if job.hold == "servo":
         hold = ActiveHold(job.host, reader, job.held_pose_rad, job.held_pose_tolerance_rad)
+    forbid_new_descriptors()  # the wheel's own thread would connect again and restart its script
     gc.freeze()
     gc.disable()
     realtime = job.realtime_priority > 0 and try_realtime(job.realtime_priority)

@@ -263,3 +263,12 @@ def test_a_status_line_that_makes_no_sense_is_a_device_error() -> None:
     for line in (b"", b"{}\n", b'{"event": "error"}\n', b'{"event": "ready", "info": 3, "realtime": true}\n'):
         with pytest.raises(DeviceError, match="reported"):
             parse_status(line)
+
+
+def test_a_child_that_ignores_sigterm_is_killed() -> None:
+    code = "import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint(flush=True)\ntime.sleep(60)"
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert child.stdout is not None
+    child.stdout.readline()
+    assert end_child(child, within_s=0.1) == -signal.SIGKILL
+    child.stdout.close()
