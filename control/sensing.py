@@ -6,9 +6,9 @@ import math
 
 from msgspec.structs import replace
 
-from control import tare
 from control.settings import Settings
 from control.wrench import force_on_slider_world, low_pass
+from robot_io.ft300_tare import add
 from robot_io.tick import ControlState, FtReading, Phase
 
 VALID_FOR_NS = 100_000_000
@@ -51,9 +51,9 @@ def in_contact(settings: Settings, state: ControlState) -> bool:
 
 
 def _sum_up(settings: Settings, state: ControlState, readings: tuple[FtReading, ...]) -> ControlState:
-    wanted = tare.wanted_readings(settings.ft)
+    wanted = settings.tare_readings
     sums = state.tare
     for reading in readings:
         if sums.count < wanted and reading.received_ns > state.phase_since_ns:
-            sums = tare.add(sums, reading, wanted)
+            sums = add(sums, (*reading.force, *reading.torque), wanted)
     return replace(state, tare=sums, last_reading_ns=readings[-1].received_ns)

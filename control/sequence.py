@@ -6,10 +6,11 @@ import math
 
 from msgspec.structs import replace
 
-from control import push_law, tare
+from control import push_law
 from control.sensing import in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
+from robot_io.ft300_tare import judge
 from robot_io.messages import LinkState
 from robot_io.tick import ControlState, Operator, Phase, TickInput
 
@@ -102,11 +103,12 @@ def _settle(settings: Settings, state: ControlState, inp: TickInput, along: floa
 
 
 def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
-    if state.refusal or state.tare.count < tare.wanted_readings(settings.ft):
+    if state.refusal or state.tare.count < settings.tare_readings:
         return state
-    refusal, bias = tare.judge(state.tare, settings.ft)
-    if refusal:
-        return replace(state, refusal=int(refusal))
+    judged = judge(state.tare, settings.ft.noise_force_N, settings.ft.noise_torque_Nm)
+    if judged.refusal:
+        return replace(state, refusal=int(judged.refusal))
+    bias = judged.tare.bias
     return _enter(
         state,
         Phase.APPROACH,

@@ -21,6 +21,8 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     expected_contact_m: float
     period_s: float
     """Period of the loop, s."""
+    tare_readings: int
+    """How many readings a tare needs; the sensor gives 100 in a second."""
     in_contact: bool
 
     @classmethod
@@ -36,5 +38,6 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
             contact_y,
             rig.path.expected_contact_m,
             1.0 / rig.loop.rate_hz,
+            round(100 * rig.ft.tare_seconds_s),
             in_contact,
         )

@@ -15,6 +15,7 @@ import msgspec
 from robot_io.arm_record import ArmRecord
 from robot_io.base_record import BaseRecord
 from robot_io.cdr import CdrType
+from robot_io.ft300_tare import TareSums
 from robot_io.messages import BodyTwist, WorldTwist
 
 Vector3 = tuple[float, float, float]
@@ -113,17 +114,6 @@ class TickInput(msgspec.Struct, frozen=True, gc=False):
     base: BaseRecord
 
 
-class TareState(msgspec.Struct, frozen=True, gc=False):
-    """Running sums of the tare: N, N*m in the SENSOR frame."""
-
-    __ros_name__: ClassVar[str] = "push_msgs/msg/TareState"
-    count: int = 0
-    total: Vector6 = (0.0,) * 6
-    squares: Vector6 = (0.0,) * 6
-    first_half: Vector6 = (0.0,) * 6
-    """Sum of the first half of the wanted samples, to see a drift."""
-
-
 class ControlState(msgspec.Struct, frozen=True, gc=False):
     """What control remembers from tick to tick."""
 
@@ -135,7 +125,7 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     """Why the tare was refused: 0 not, 1 unsettled, 2 nearly saturated."""
     bias_force: Vector3 = (0.0, 0.0, 0.0)
     bias_torque: Vector3 = (0.0, 0.0, 0.0)
-    tare: TareState = TareState()
+    tare: TareSums = TareSums()
     last_reading_ns: int = 0
     force_world: Vector3 = (0.0, 0.0, 0.0)
     """Filtered force on the slider, N, WORLD frame."""
