@@ -53,5 +53,6 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "bias_force_N": list(control.bias_force),
         "bias_torque_Nm": list(control.bias_torque),
         "tared": control.tared,
+        "held_joints_rad": list(control.held_joints),
         "arm_packets": inp.arm.packets,
     }

@@ -88,9 +88,10 @@ def everyone_spoke(inp: TickInput) -> bool:
 def _settle(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
     if not everyone_spoke(inp):
         return state
-    held = replace(state, held_yaw=inp.base.pose.yaw, held_joints=inp.arm.joints.position, approach_from_m=along)
+    held = replace(state, held_yaw=inp.base.pose.yaw, approach_from_m=along)
     if not settings.in_contact:
-        return _enter(held, Phase.TARE, inp.now_ns)
+        return _enter(held, Phase.TARE, inp.now_ns, held_joints=inp.arm.joints.position)
+    # A saved tare holds at the joints it was taken at: those stay, and a moved arm is a fault (F20).
     return _enter(
         held,
         Phase.PUSH,

@@ -57,6 +57,8 @@ def check(
         faults.append("F20-stop")
     elif drift > settings.hold_slow:
         faults.append("F20-hold")
+    if any(abs(q - p) > settings.held_pose_tolerance for q, p in zip(joints.position, settings.held_pose, strict=True)):
+        faults.append("R04")
     run = state.arm_velocity_run + 1 if max(map(abs, joints.velocity)) > MAX_JOINT_SPEED_RAD_PER_S else 0
     if run >= JOINT_SPEED_TICKS:
         faults.append("F21")

@@ -46,6 +46,7 @@ FAULTS: dict[str, Fault] = dict(
         _row("R01", "a device did not speak within 5 s of the start", Mode.STOP, _L, 1, 4),
         _row("R02", "the force sensor was not settled while taring", Mode.STOP, _L, 1, 4),
         _row("R03", "the force sensor's bias leaves too little range", Mode.STOP, _L, 1, 4),
+        _row("R04", "the arm is not at the rig's held pose, for which its frames are given", Mode.STOP, _L, 1, 4),
         _row("F01-slow", "no force packet for 50 ms", Mode.SLOW, _A, 5),
         _row("F01-hold", "no force packet for 80 ms", Mode.HOLD, _A, 8),
         _row("F01-stop", "no force packet for 160 ms", Mode.STOP, _L, 16),

@@ -7,6 +7,7 @@ import math
 import msgspec
 
 from robot_io.config import RigConfig
+from robot_io.messages import Joints
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
 
@@ -20,6 +21,9 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     max_torque: float
     noise_floor: bool
     """The sensor's readings scatter, so that equal ones are a fault."""
+    held_pose: Joints
+    """Where the arm must be, rad: the frames of the rig are those of this pose."""
+    held_pose_tolerance: float
     hold_slow: float
     hold_stop: float
     servo: bool
@@ -39,6 +43,8 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
             limits.slow_force_N,
             limits.max_torque_Nm,
             rig.ft.noise_force_N > 0.0,
+            rig.arm.held_pose_rad,
+            rig.arm.held_pose_tolerance_rad,
             limits.hold_slow_rad,
             limits.hold_stop_rad,
             rig.arm.hold == "servo",

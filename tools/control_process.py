@@ -44,7 +44,7 @@ def main() -> int:
         sensor.close()
         status.error(error)
         return error.exit_code
-    core = TickCore.of(rig, in_contact=job.in_contact)
+    core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = BaseLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
     watch = Watch(
@@ -52,7 +52,7 @@ def main() -> int:
     )
     loop = ControlLoop(
         core.fold,
-        first_state(job.saved_bias),
+        first_state(job.saved_tare),
         rate_hz=rig.loop.rate_hz,
         sensor=sensor,
         arm=arm,

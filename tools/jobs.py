@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from robot_io.tick import Vector6
+from tools.saved_tare import SavedTare
 
 
 class ControlJob(msgspec.Struct, frozen=True):
@@ -12,8 +12,7 @@ class ControlJob(msgspec.Struct, frozen=True):
 
     rig_toml: str
     ft_port: str
-    in_contact: bool
-    saved_bias: Vector6 | None
+    saved_tare: SavedTare | None
     launcher_pid: int
     gate_fd: int
     base_record_fd: int

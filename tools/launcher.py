@@ -30,7 +30,6 @@ from robot_io.errors import DeviceError, OperatorStop, SafetyStop
 from robot_io.event_loop import EventLoop
 from robot_io.ring import Ring
 from robot_io.shared_record import SharedRecord
-from robot_io.tick import Vector6
 from robot_io.ur10 import spawn_child
 from safety.gate import GateLimits, Latch
 from safety.gate_process import GateJob
@@ -44,6 +43,7 @@ from tools.recorder import Job as RecorderJob
 from tools.recorder import RingSource
 from tools.rig import devices_at
 from tools.run_facts import level_of, run_facts
+from tools.saved_tare import SavedTare
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes of a recorder that does not drain."""
@@ -61,11 +61,11 @@ DEVICE_NAMES = {"ft": "ft300", "arm": "ur10", "base": "ridgeback"}
 class Launcher:
     """One run at level emulated, hardware or a mix; `run` returns what control said at its end."""
 
-    def __init__(self, rig: RigConfig, out: Path, *, seed: int, saved_bias: Vector6 | None, live: LiveLine) -> None:
+    def __init__(self, rig: RigConfig, out: Path, *, seed: int, saved: SavedTare | None, live: LiveLine) -> None:
         self._rig = rig
         self._out = out
         self._seed = seed
-        self._saved_bias = saved_bias
+        self._saved = saved
         self._live = live
         self._loop = EventLoop()
         self._children: dict[str, Child] = {}
@@ -148,7 +148,15 @@ class Launcher:
             record.close()
         self._write_processes()
         self._wait_ready(["recorder", "gate", "arm", "control"], READY_NS)
+        self._tell_priority()
         os.write(self._operator_fd, b"G")
+
+    def _tell_priority(self) -> None:
+        plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
+        if plain:
+            self._live.say(
+                f"no right to real-time priority: {', '.join(plain)} at normal priority (supported at 100 Hz)"
+            )
 
     def _spawn(self, name: str, module: str, job: Any, fds: list[int]) -> Child:
         status = os.pipe()
@@ -161,7 +169,7 @@ class Launcher:
         return child
 
     def _spawn_recorder(self, config_text: str, rings: dict[str, Ring], alive: list[int]) -> None:
-        facts = run_facts(level_of(self._rig), self._seed, in_contact=self._saved_bias is not None)
+        facts = run_facts(level_of(self._rig), self._seed, in_contact=self._saved is not None)
         facts["kernel"] = platform.release()
         self._spawn(
             "recorder",
@@ -221,8 +229,7 @@ class Launcher:
             lambda status: ControlJob(
                 rig_to_toml(rig),
                 rig.ft.port,
-                self._saved_bias is not None,
-                self._saved_bias,
+                self._saved,
                 os.getpid(),
                 gate_fd,
                 base_fd,

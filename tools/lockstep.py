@@ -22,7 +22,7 @@ from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, VirtualClock
 from robot_io.config import RigConfig
 from robot_io.gate_frame import GateFrame
 from robot_io.gate_log import GateLog
-from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState, Vector6
+from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety import gate
 from safety.gate import GateLimits, GateState
 from safety.settings import SafetySettings
@@ -34,6 +34,7 @@ from sim_backend.world import World
 from tools.run_facts import run_facts
 from tools.run_log import RunLog
 from tools.run_state import first_state
+from tools.saved_tare import SavedTare
 from tools.tick_core import TickCore, tick_message
 from tools.world_log import into
 
@@ -63,7 +64,7 @@ class Lockstep:
         seed: int,
         log: LockstepLog,
         *,
-        saved_bias: Vector6 | None = None,
+        saved: SavedTare | None = None,
     ) -> None:
         self.rig = rig
         self._log = log
@@ -79,8 +80,8 @@ class Lockstep:
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
         )
-        self._core = TickCore.of(rig, in_contact=saved_bias is not None)
-        self._state = first_state(saved_bias)
+        self._core = TickCore.of(rig, in_contact=saved is not None)
+        self._state = first_state(saved)
         settings = SafetySettings.of(rig)
         limits = settings.envelope
         self._gate_limits = GateLimits(

@@ -9,12 +9,13 @@ from typing import Any
 from robot_io.config import RigConfig
 from robot_io.error_report import say_json, tell
 from robot_io.errors import UsageError
-from robot_io.tick import TickInput, TickOutput, TickState, Vector6
+from robot_io.tick import TickInput, TickOutput, TickState
 from tools import run_dir, saved_tare, verdict
 from tools.live_line import LiveLine
 from tools.rig import devices_at, resolve_rig
 from tools.run_facts import level_of
 from tools.run_state import status_line
+from tools.saved_tare import SavedTare
 from tools.state_dir import RigLock
 
 
@@ -111,11 +112,11 @@ def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
     return 0
 
 
-def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Vector6 | None) -> dict[str, Any]:
+def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
     """Run the processes of a wall-clock run and return its summary."""
     from tools.launcher import Launcher
 
-    launcher = Launcher(rig, out, seed=args.seed, saved_bias=saved, live=LiveLine(rig))
+    launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig))
     figures = launcher.run()
     keep_tare(rig, figures)
     recorded = launcher.recorded()
@@ -137,13 +138,13 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Vecto
     )
 
 
-def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Vector6 | None) -> dict[str, Any]:
+def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
     """Run level sim in this process and return its summary."""
     from tools.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
     text = run_dir.write_config(out, rig)
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
-    one = Lockstep(rig, args.seed, log, saved_bias=saved)
+    one = Lockstep(rig, args.seed, log, saved=saved)
     stop_on_signals(one)
     live = LiveLine(rig, quiet=args.fast)
     pace = WallPace(1.0 / rig.loop.rate_hz)
@@ -176,7 +177,8 @@ def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Vector6
 def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
     """Keep the tare of a run that got that far, for `--start-in-contact`."""
     if figures["tared"]:
-        saved_tare.save(rig, (*figures["bias_force_N"], *figures["bias_torque_Nm"]))
+        bias = (*figures["bias_force_N"], *figures["bias_torque_Nm"])
+        saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
 
 
 def report(summary: dict[str, Any], out: Path) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState, Vector6
+from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState
+from tools.saved_tare import SavedTare
 
 
-def first_state(bias: Vector6 | None) -> TickState:
-    """Return the state a run begins with: untared, or with a bias saved earlier in this power cycle."""
-    if bias is None:
+def first_state(saved: SavedTare | None) -> TickState:
+    """Return the state a run begins with: untared, or with a tare saved earlier, valid at the joints it holds."""
+    if saved is None:
         return TickState()
-    return TickState(ControlState(tared=True, bias_force=bias[:3], bias_torque=bias[3:]))
+    bias = saved.bias
+    return TickState(ControlState(tared=True, bias_force=bias[:3], bias_torque=bias[3:], held_joints=saved.joints))
 
 
 def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:

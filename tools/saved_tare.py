@@ -21,9 +21,10 @@ MAX_AGE_S = 12 * 3600.0
 
 
 class SavedTare(msgspec.Struct, frozen=True):
-    """Bias in N and N*m (SENSOR frame), and what it is valid for."""
+    """Bias in N and N*m (SENSOR frame), and what it is valid for: the joints of the arm (rad), the power cycle."""
 
     bias: Vector6
+    joints: Vector6
     power_cycle: str
     saved_s: float
 
@@ -36,14 +37,14 @@ def power_cycle(rig: RigConfig) -> str:
     return hashlib.sha256(parts).hexdigest()
 
 
-def save(rig: RigConfig, bias: Vector6) -> None:
+def save(rig: RigConfig, bias: Vector6, joints: Vector6) -> None:
     """Keep a tare for later runs of this rig."""
-    tare = SavedTare(bias, power_cycle(rig), time.time())
+    tare = SavedTare(bias, joints, power_cycle(rig), time.time())
     _path(rig).write_bytes(msgspec.json.encode(tare))
 
 
-def load(rig: RigConfig) -> Vector6:
-    """Return the saved bias. Raises UsageError when there is none that is valid now."""
+def load(rig: RigConfig) -> SavedTare:
+    """Return the saved tare. Raises UsageError when there is none that is valid now."""
     try:
         tare = msgspec.json.decode(_path(rig).read_bytes(), type=SavedTare)
     except (OSError, msgspec.MsgspecError):
@@ -55,7 +56,7 @@ def load(rig: RigConfig) -> Vector6:
             where=rig.name,
             do="Run a push that starts out of contact first; it saves one",
         )
-    return tare.bias
+    return tare
 
 
 def _path(rig: RigConfig) -> Path:
