@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from sim_backend.rosbridge_emulator import RosbridgeEmulator
 
 _JOYSTICK_PERIOD_NS = NS_PER_S // 20
+_BURST_OUT_NS = 1_000_000
+"""After a freeze the backlog of the clients is read first, then theirs goes out."""
 
 
 class BridgeFaults:
@@ -113,7 +115,7 @@ class BridgeFaults:
 
     def _thaw(self) -> None:
         self._emulator.server.set_running(True)
-        self._emulator.release()
+        self._loop.call_at(monotonic_ns() + _BURST_OUT_NS, self._emulator.release)
 
     def _set_reading(self, peers: list[WebSocketPeer], reading: bool) -> None:
         for peer in peers:

@@ -1,9 +1,10 @@
 """A websocket server inside an event loop, on the Sans-I/O connection of `wsproto`, with the bad habits of a real one.
 
 Behaves as rosbridge's server does: any path, no subprotocol, no compression, an answer to every ping, an output
-buffer that grows while a client does not read. A connection that ends without a goodbye takes what it had not
-yet been worked on with it: the worker had one message in hand, the rest is dropped. Faults (frozen process,
-half-open link, a server that stops reading, a killed one) are switches here.
+buffer that grows while a client does not read. A connection that is reset takes what had not yet been worked on
+with it: the worker had one message in hand, the rest is dropped. One that is closed in order does not (a real
+server drops about half of it then; the worse case is taken here). Faults (frozen process, half-open link, a
+server that stops reading, a killed one) are switches here.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from robot_io.event_loop import READ, WRITE, EventLoop
 MAX_UNSENT_BYTES = 64 * 1024 * 1024
 """A client that reads nothing is dropped here; the real server would go on until memory ends."""
 _RECEIVE_BYTES = 65_536
+_MAX_BATCH_BYTES = 16 * 1024 * 1024
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)
 _SERVER_NAME = b"AutobahnPython/23.1.2"
 
@@ -40,6 +42,7 @@ class WebSocketPeer:
         self._unsent = bytearray()
         self._text: list[str] = []
         self._closing = False
+        self._broken = False
         self.open = False
         self.silent = False
         """Half-open: nothing goes out or comes in any more, and nobody is told."""
@@ -85,40 +88,49 @@ class WebSocketPeer:
             self._write(b"")
         if self._socket is None or not events & ~WRITE:
             return
+        data, ended, reset = self._read()
         texts: list[str] = []
-        ended = self._read(texts)
-        if ended and not self._closing:
+        ended = self._parse(data, texts) or ended
+        if reset:
             del texts[1:]
         for text in texts:
             self._server.on_text(self, text)
         if ended:
             self.end()
 
-    def _read(self, texts: list[str]) -> bool:
-        """Read all there is; return whether the connection is over."""
-        while self._socket is not None:
+    def _read(self) -> tuple[bytes, bool, bool]:
+        """Read all there is before anything is answered; return it, whether that was all, and whether by a reset."""
+        assert self._socket is not None
+        data = bytearray()
+        while len(data) < _MAX_BATCH_BYTES:
             try:
-                data = self._socket.recv(_RECEIVE_BYTES)
+                part = self._socket.recv(_RECEIVE_BYTES)
             except BlockingIOError:
-                return False
+                return bytes(data), False, False
             except OSError:
-                return True
-            if not data:
-                return True
+                return bytes(data), True, True
+            if not part:
+                return bytes(data), True, False
+            data += part
             self.newest_inbound_ns = monotonic_ns()
-            try:
+        return bytes(data), False, False
+
+    def _parse(self, data: bytes, texts: list[str]) -> bool:
+        """Append the texts in `data`, answer control frames; return whether the client said goodbye or nonsense."""
+        try:
+            if data:
                 self._websocket.receive_data(data)
-                for event in self._websocket.events():
-                    self._on_event(event, texts)
-            except RemoteProtocolError as error:
-                if error.event_hint is not None and not self.open:  # no websocket handshake: answer HTTP 400
-                    self._write(self._websocket.send(error.event_hint))
-                return True
-            except ProtocolError:
-                return True
-            if self._closing:
-                return True
-        return True
+            for event in self._websocket.events():
+                self._on_event(event, texts)
+                if self._closing:
+                    return True
+        except RemoteProtocolError as error:
+            if error.event_hint is not None and not self.open:  # no websocket handshake: answer HTTP 400
+                self._write(self._websocket.send(error.event_hint))
+            return True
+        except ProtocolError:
+            return True
+        return False
 
     def _on_event(self, event: Event, texts: list[str]) -> None:
         if isinstance(event, TextMessage):
@@ -140,7 +152,7 @@ class WebSocketPeer:
             raise ProtocolError(f"unexpected {event}")
 
     def _write(self, data: bytes) -> None:
-        if self._socket is None:
+        if self._socket is None or self._broken:
             return
         waiting = bool(self._unsent)
         self._unsent += data
@@ -150,8 +162,8 @@ class WebSocketPeer:
         except BlockingIOError:
             pass
         except OSError:
-            self.end()
-            return
+            self._broken = True  # what it sent before is still worked on; the reading side ends the connection
+            self._unsent.clear()
         if len(self._unsent) > MAX_UNSENT_BYTES:
             self.end(reset=True)
         elif bool(self._unsent) != waiting:

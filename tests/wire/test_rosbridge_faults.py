@@ -13,6 +13,7 @@ from robot_io.base_feed import BasePose, CommandEcho
 from robot_io.config import TopicsConfig
 from robot_io.messages import BodyTwist, LinkState, Pose2D
 from robot_io.ridgeback import FRESH_NS, LINK_STALE_NS, Ridgeback
+from robot_io.websocket_link import LinkLost, WebSocketLink
 from tests.wire.bridge_process import Bridge, running_bridge, until
 
 FORWARD = BodyTwist(0.1, 0.0, 0.0)
@@ -160,6 +161,13 @@ def test_a_bridge_that_does_not_read_is_given_up_without_blocking(bridge: Bridge
         assert slowest < 0.5  # it never waited for the 30 s
 
 
+def test_part_of_a_message_is_a_lost_link(bridge: Bridge):
+    link = WebSocketLink.connect(bridge.url)
+    with pytest.raises(LinkLost, match="part"):
+        link.send_text(b" " * 50_000_000)
+    link.abort()
+
+
 def test_a_poisoned_connection_is_seen_by_the_missing_echo(bridge: Bridge):
     with Ridgeback(bridge.url, topics=TOPICS) as base:
         assert until(lambda: bool(drive(base, 0.02)) and base.health().counters["echo"] > 5, every_s=0)
@@ -208,24 +216,30 @@ def test_a_pose_jump_comes_through_for_safety_to_judge(bridge: Bridge):
         assert until(jumped)
 
 
+def pose_age(base: Ridgeback) -> float:
+    """Median age (s) of a few fresh poses by their own stamps."""
+    base.drain()
+    ages: list[float] = []
+
+    def enough() -> bool:
+        ages.extend(time.time() - s.device_time_s for s in base.drain() if isinstance(s.value, BasePose))
+        return len(ages) > 10
+
+    assert until(enough)
+    return sorted(ages)[len(ages) // 2]
+
+
 def test_lag_shows_in_the_stamps(bridge: Bridge):
     with Ridgeback(bridge.url, topics=TOPICS) as base:
-
-        def age() -> float:
-            base.drain()
-            ages: list[float] = []
-            assert until(
-                lambda: bool(
-                    ages.extend(time.time() - s.device_time_s for s in base.drain() if isinstance(s.value, BasePose))
-                    or len(ages) > 10
-                )
-            )
-            return sorted(ages)[len(ages) // 2]
-
-        normal = age()
+        normal = pose_age(base)
         bridge.do("lag", 0.09)
-        assert until(lambda: age() > normal + 0.06)
+        assert until(lambda: pose_age(base) > normal + 0.06)
         assert base.health().state == LinkState.UP
+
+
+def test_motion_capture_is_as_late_as_it_says():
+    with running_bridge({"mocap_latency_s": 0.05}) as bridge, Ridgeback(bridge.url, topics=TOPICS) as base:
+        assert pose_age(base) > 0.049
 
 
 def test_the_joystick_wins(bridge: Bridge):
