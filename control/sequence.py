@@ -89,18 +89,10 @@ def _settle(settings: Settings, state: ControlState, inp: TickInput, along: floa
     if not everyone_spoke(inp):
         return state
     held = replace(state, held_yaw=inp.base.pose.yaw, approach_from_m=along)
-    if not settings.in_contact:
-        return _enter(held, Phase.TARE, inp.now_ns, held_joints=inp.arm.joints.position)
-    # A saved tare holds at the joints it was taken at: those stay, and a moved arm is a fault (F20).
-    return _enter(
-        held,
-        Phase.PUSH,
-        inp.now_ns,
-        contact_seen=True,
-        contact_from_m=along,
-        ramp_since_ns=inp.now_ns,
-        ramp_from_speed=0.0,
-    )
+    if settings.in_contact:
+        # A saved tare holds at the joints it was taken at: those stay, and a moved arm is a fault (F20).
+        return _enter(held, Phase.APPROACH, inp.now_ns)
+    return _enter(held, Phase.TARE, inp.now_ns, held_joints=inp.arm.joints.position)
 
 
 def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
