@@ -6,7 +6,7 @@ import math
 
 from msgspec.structs import replace
 
-from control import push_law
+from control import open_loop, push_law
 from control.sensing import in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
@@ -153,7 +153,7 @@ def _push(settings: Settings, state: ControlState, inp: TickInput, contact: tupl
     if control.controller == "force":
         theta_p = push_law.push_angle(theta_f, state.lateral_m, control.k_f, control.k_y_rad_per_m)
     else:
-        theta_p = 0.0
+        theta_p = open_loop.push_angle()
     if abs(theta_p) <= BACKWARD_RAD:
         return replace(state, theta_f=theta_f, theta_p=theta_p, speed=speed, backward_ticks=0)
     # Beyond 90 degrees the law would pull: the direction stays as it was and safety counts the ticks (F56).
