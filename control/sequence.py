@@ -10,7 +10,7 @@ from control import open_loop, push_law
 from control.sensing import in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
-from robot_io.ft300_tare import judge
+from robot_io.ft300_tare import TareSums, judge
 from robot_io.messages import LinkState
 from robot_io.tick import ControlState, Operator, Phase, TickInput
 
@@ -96,6 +96,8 @@ def _settle(settings: Settings, state: ControlState, inp: TickInput, along: floa
 
 
 def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
+    if not state.rest_since_ns:  # somebody drives the base by hand: only what is measured at rest counts
+        return replace(state, tare=TareSums())
     if state.refusal or state.tare.count < settings.tare_readings:
         return state
     judged = judge(state.tare, settings.ft.noise_force_N, settings.ft.noise_torque_Nm)

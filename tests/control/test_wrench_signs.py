@@ -16,7 +16,6 @@ from itertools import combinations
 
 import pytest
 from msgspec.structs import replace
-from tests.mutants import sign_mutants
 
 import control.wrench
 import sim_backend.sensor_model
@@ -25,6 +24,7 @@ from control.step import step
 from robot_io.config import RigConfig
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, FtReading, TickInput
+from tests.mutants import sign_mutants
 from tools.rig import resolve_rig
 
 SIN_A, COS_A = 0.2578500, 0.9661850
