@@ -1,0 +1,88 @@
+"""Columns of a log that fit into memory however long the log is: thinned evenly, or counted in bins."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+BIGGEST = 1e9
+"""Larger numbers, and those that are not finite, become NaN: no quantity of a log is as large, and no axis bears it."""
+
+
+class Series:
+    """Rows of floats, at most `limit` of them: when full, every other row is dropped and then left out.
+
+    Ask `wants()` once per sample, in order, before the work of making its row.
+    """
+
+    def __init__(self, columns: Sequence[str], limit: int = 60_000) -> None:
+        self.names = tuple(columns)
+        self.stride = 1
+        self._limit = limit
+        self._seen = 0
+        self._columns = [array("d") for _ in self.names]
+
+    def __len__(self) -> int:
+        return len(self._columns[0])
+
+    def wants(self) -> bool:
+        """Tell whether the next sample is kept."""
+        wanted = self._seen % self.stride == 0
+        self._seen += 1
+        return wanted
+
+    def add(self, row: Sequence[float]) -> None:
+        """Append one row."""
+        for column, value in zip(self._columns, row, strict=True):
+            column.append(value)
+        if len(self) >= self._limit:
+            self._columns = [column[::2] for column in self._columns]
+            self.stride *= 2
+
+    def arrays(self) -> dict[str, Floats]:
+        """Return the columns by name, each of shape (rows,)."""
+        made = {}
+        for name, column in zip(self.names, self._columns, strict=True):
+            values = np.array(column, dtype=np.float64)
+            values[~(np.abs(values) < BIGGEST)] = np.nan
+            made[name] = values
+        return made
+
+
+class Tally:
+    """Counts of non-negative times in bins of 10 us up to 1 s, and the exact greatest."""
+
+    BIN_MS = 0.01
+    _BINS = 100_000
+
+    def __init__(self) -> None:
+        self.total = 0
+        self.worst_ms = 0.0
+        self._counts = array("Q", bytes(8 * (self._BINS + 1)))
+
+    def add(self, time_ms: float) -> None:
+        """Count one time; what is not a number is left out."""
+        if not time_ms >= 0.0:
+            return
+        self.total += 1
+        self.worst_ms = max(self.worst_ms, time_ms)
+        self._counts[int(min(time_ms / self.BIN_MS, self._BINS))] += 1
+
+    def percentile_ms(self, percent: float) -> float:
+        """Return the upper edge of the bin that holds the percentile (NaN when nothing was counted)."""
+        if not self.total:
+            return float("nan")
+        sums = np.cumsum(np.array(self._counts, dtype=np.uint64))
+        index = int(np.searchsorted(sums, percent / 100.0 * self.total))
+        return min((index + 1) * self.BIN_MS, self.worst_ms)
+
+    def counts_in(self, edges_ms: Floats) -> Floats:
+        """Return how many times lie between neighbouring edges (ms, rising), shape (edges - 1,)."""
+        lows = np.arange(self._BINS + 1) * self.BIN_MS
+        counts, _ = np.histogram(lows + self.BIN_MS / 2, bins=edges_ms, weights=np.array(self._counts, dtype=float))
+        return counts.astype(np.float64)
