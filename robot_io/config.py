@@ -36,9 +36,9 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class LoopConfig(Table, frozen=True):
-    """Rate of the control loop."""
+    """Rate of the control loop; below 50 Hz the gate would take a single late tick for silence."""
 
-    rate_hz: Annotated[float, Meta(ge=20, le=500)] = 100.0
+    rate_hz: Annotated[float, Meta(ge=50, le=500)] = 100.0
 
 
 class FtConfig(Table, frozen=True):
