@@ -130,5 +130,12 @@ class PtyPort:
             self._on_bytes(data)
         elif events & HANGUP:
             self._loop.remove_fd(self._master)
-            termios.tcflush(self._master, termios.TCIOFLUSH)
+            self._forget_unread()
             self._await_client()
+
+    def _forget_unread(self) -> None:
+        """Drop what the client left unread: a real port does when it is closed, a pty keeps it for the next one."""
+        with contextlib.suppress(OSError):
+            slave = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+            termios.tcflush(slave, termios.TCIFLUSH)
+            os.close(slave)

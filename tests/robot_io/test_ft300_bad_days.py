@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import os
 import select
 import socket
+import struct
 import threading
 import time
 from pathlib import Path
@@ -153,7 +155,7 @@ class Server:
         self.listener.close()
 
 
-def bridge(server, emulator, done, *, flood=b""):
+def bridge(server, emulator, done, *, flood=b"", reset=False):
     """Carry bytes between the TCP client and the emulator's pty until `done`."""
     client, _ = server.listener.accept()
     with client, serial.Serial(emulator.port, 19200, timeout=0) as port:
@@ -168,7 +170,10 @@ def bridge(server, emulator, done, *, flood=b""):
                 client.sendall(port.read(4096))
         if flood:
             client.sendall(flood)
-        client.shutdown(socket.SHUT_RDWR)
+        if reset:
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        else:
+            client.shutdown(socket.SHUT_RDWR)
 
 
 def test_a_serial_server_over_tcp_and_its_end():
@@ -190,6 +195,28 @@ def test_a_serial_server_over_tcp_and_its_end():
             done.set()
             sensor.close()
             carrier.join()
+
+
+def test_a_serial_server_that_resets_the_connection_leaves_nothing_open():
+    done = threading.Event()
+    with ft300_process() as emulator, Server() as server:
+        carrier = threading.Thread(target=bridge, args=(server, emulator, done), kwargs={"reset": True})
+        carrier.start()
+        sensor = Ft300(server.port)
+        try:
+            sensor.open()
+            sensor.start()
+            descriptor = sensor.fileno()
+            done.set()
+            carrier.join()
+            assert until(lambda: sensor.drain() == () and sensor.health().state is LinkState.LOST)
+            assert "reset" in sensor.health().cause.lower()
+        finally:
+            done.set()
+            sensor.close()
+            carrier.join()
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.fstat(descriptor)
 
 
 def test_a_flood_is_read_in_bounded_bites_oldest_dropped_and_counted():
