@@ -42,7 +42,7 @@ class WebSocketPeer:
         self._unsent = bytearray()
         self._text: list[str] = []
         self._closing = False
-        self._broken = False
+        self._broken = self._reset = False
         self.open = False
         self.silent = False
         """Half-open: nothing goes out or comes in any more, and nobody is told."""
@@ -107,10 +107,10 @@ class WebSocketPeer:
                 part = self._socket.recv(_RECEIVE_BYTES)
             except BlockingIOError:
                 return bytes(data), False, False
-            except OSError:
-                return bytes(data), True, True
+            except OSError as error:
+                return bytes(data), True, isinstance(error, ConnectionResetError)
             if not part:
-                return bytes(data), True, False
+                return bytes(data), True, self._reset
             data += part
             self.newest_inbound_ns = monotonic_ns()
         return bytes(data), False, False
@@ -161,8 +161,11 @@ class WebSocketPeer:
                 del self._unsent[: self._socket.send(self._unsent)]
         except BlockingIOError:
             pass
-        except OSError:
-            self._broken = True  # what it sent before is still worked on; the reading side ends the connection
+        except OSError as error:
+            # What came before is still worked on, and the reading side ends the connection. A reset is told once only:
+            # here, or there. (Writing to a client that closed in order gives EPIPE instead.)
+            self._broken = True
+            self._reset = isinstance(error, ConnectionResetError)
             self._unsent.clear()
         if len(self._unsent) > MAX_UNSENT_BYTES:
             self.end(reset=True)
