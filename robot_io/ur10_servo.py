@@ -9,8 +9,10 @@ the first fault nothing is called any more: the watchdog stops the program and t
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import time
+from collections.abc import Iterator
 from typing import Any
 
 from robot_io.arm_record import ArmError
@@ -29,6 +31,9 @@ GAIN = 300.0
 AT_REST_RAD_PER_S = 0.02
 SCRIPT_START_NS = 1 * NS_PER_S
 END_WITHIN_S = 2.0
+COMMAND_WITHIN_S = 0.5
+FIRST_COMMAND_WITHIN_S = 5.0
+"""The wheel itself waits up to 4 s for its script to be ready."""
 
 STOPPED = 1
 PLAYING = 2
@@ -52,7 +57,7 @@ class ActiveHold:
                 raise DeviceNotReady(
                     "the control script refused the watchdog", where=host, do="Use hold = monitor, or try again."
                 )
-            if not self._command():  # waits until the script is ready; later calls return at once
+            if not self._command(FIRST_COMMAND_WITHIN_S):  # waits until the script is ready; later calls return at once
                 raise DeviceNotReady(
                     "the control script refused the first target", where=host, do="Use hold = monitor, or try again."
                 )
@@ -65,25 +70,24 @@ class ActiveHold:
         if self._ended or reader.joints is None:
             return ArmError.SERVO_STOPPED
         fault = self._fault(reader, reader.joints, now_ns)
-        if fault == ArmError.NONE and not self._command():
+        if fault == ArmError.NONE and not self._command(COMMAND_WITHIN_S):
             fault = ArmError.SERVO_STOPPED
         if fault != ArmError.NONE:
             self._ended = True
         return fault
 
     def end(self) -> None:
-        """Stop servoing and end the script, only while the link is known to be alive; killed after 2 s."""
+        """Stop servoing and end the script, only while the link is known to be alive; at most 2 s."""
         if self._ended:
             return
         self._ended = True
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)  # the calls below can hang in C++ with no way back
-        signal.setitimer(signal.ITIMER_REAL, END_WITHIN_S)
-        self._rtde.servoStop()
-        self._rtde.stopScript()
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        with _killed_after(END_WITHIN_S):
+            self._rtde.servoStop()
+            self._rtde.stopScript()
 
-    def _command(self) -> bool:
-        accepted: bool = self._rtde.servoJ(list(self.target), 0.0, 0.0, CYCLE_S, LOOKAHEAD_S, GAIN)
+    def _command(self, within_s: float) -> bool:
+        with _killed_after(within_s):
+            accepted: bool = self._rtde.servoJ(list(self.target), 0.0, 0.0, CYCLE_S, LOOKAHEAD_S, GAIN)
         return accepted
 
     def _fault(self, reader: ArmReader, joints: JointState, now_ns: int) -> ArmError:
@@ -98,6 +102,15 @@ class ActiveHold:
         if max_difference(joints.position, self.target) > self._tolerance_rad:
             return ArmError.SERVO_NOT_HOLDING
         return ArmError.NONE
+
+
+@contextlib.contextmanager
+def _killed_after(seconds: float) -> Iterator[None]:
+    """Have the kernel end this process (SIGALRM) when the calls inside hang in C++, where nothing else helps."""
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    yield
+    signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def max_difference(a: Joints, b: Joints) -> float:
