@@ -1,7 +1,7 @@
 """The end-of-run report: one self-contained HTML page made from a log alone.
 
-`python -m tools.report LOG HTML PARENT` is how `push run` makes it: a process of its own, so that a report that cannot be
-made is no failure of the run.
+`python -m tools.report LOG HTML PARENT` is how `push run` makes it: a process of its own, so that a report that cannot
+be made is no failure of the run.
 """
 
 from __future__ import annotations
@@ -96,7 +96,8 @@ def page(run: RunData, summary: dict[str, Any], pngs: dict[str, bytes], mark: st
     rig = run.rig
     law = "force feedback" if rig.control.controller == "force" else "open loop"
     level = run.facts.get("level", "level not named")
-    subtitle = f"{rig.name} ({level}), {law}, seed {run.facts.get('seed', '-')}, {run.log.name}"
+    name = rig.name if rig.name == level else f"{rig.name} ({level})"
+    subtitle = f"{name}, {law}, seed {run.facts.get('seed', '-')}, {run.log.name}"
     baseline = words.baseline_of(rig)
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         run_mark=mark,

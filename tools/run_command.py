@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +20,8 @@ from tools.run_facts import level_of
 from tools.run_state import status_line
 from tools.saved_tare import SavedTare
 from tools.state_dir import RigLock
+
+REPORT_TIMEOUT_S = 60.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,9 +53,11 @@ def run(args: argparse.Namespace) -> int:
     with RigLock(rig.name) if not simulated else _NoLock():
         out = run_dir.create(args.out, rig.name)
         summary = lockstep(args, rig, out, saved) if simulated else wall_clock(args, rig, out, saved)
+    summary["report"] = None
     run_dir.write_json(out / "summary.json", summary)
     if not args.no_report:
         report(summary, out)
+        run_dir.write_json(out / "summary.json", summary)
     for line in verdict.person_lines(summary):
         tell(line) if args.json else print(line)
     if args.json:
@@ -182,7 +189,35 @@ def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
 
 
 def report(summary: dict[str, Any], out: Path) -> None:
-    """Write report.html; a report that cannot be made is said, and is no failure of the run."""
+    """Write report.html and name it in `summary`; a report that cannot be made is said, and is no failure of the run.
+
+    It is made in a process of its own, from the log alone.
+    """
+    page = out / "report.html"
+    command = [sys.executable, "-m", "tools.report", str(summary["log"]), str(page), str(os.getpid())]
+    try:
+        made = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            timeout=REPORT_TIMEOUT_S,
+            start_new_session=True,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        reason = f"it took longer than {REPORT_TIMEOUT_S:g} s"
+    except KeyboardInterrupt:
+        reason = "stopped by the operator"
+    except OSError as error:
+        reason = str(error)
+    else:
+        words = made.stderr.decode(errors="replace").strip().splitlines()
+        reason = (words[-1] if words else f"its process ended with code {made.returncode}") if made.returncode else ""
+    if reason:
+        tell(f"no report: {reason}; `push report {out}` makes one from the log")
+    else:
+        summary["report"] = str(page)
 
 
 class _NoLock:

@@ -263,7 +263,7 @@ class _Reader:
             fx * self._cos + fy * self._sin,
             fy * self._cos - fx * self._sin,
             raw,
-            control.theta_f if driven else math.nan,
+            control.theta_f if driven and control.phase == Phase.PUSH else math.nan,
             control.theta_p if driven else math.nan,
             math.hypot(output.wanted_body.vx, output.wanted_body.vy),
             math.hypot(output.command_body.vx, output.command_body.vy),

@@ -78,6 +78,8 @@ def person_lines(summary: dict[str, Any]) -> list[str]:
         lines.append(f"sensor after the push: {summary['residual_N']:.2f} N from zero")
     lines += summary["notes"]
     lines.append(f"log: {summary['log']}")
+    if summary.get("report"):
+        lines.append(f"report: {summary['report']}")
     return lines
 
 
