@@ -97,3 +97,4 @@ def test_readme_driver_snippets_work(tmp_path):
     finally:
         emulators.terminate()
         emulators.wait(10)
+        emulators.stdout.close()
