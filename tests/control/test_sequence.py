@@ -1,0 +1,438 @@
+"""The sequence of a push through the real fold: settle, tare, approach, push, lose and find again, rest, check."""
+
+import math
+
+import pytest
+from msgspec.structs import replace
+
+from robot_io.messages import BodyTwist, Pose2D
+from robot_io.tick import ControlState, Mode, Operator, Phase, TickState
+from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing
+from tools.tick_core import TickCore
+
+
+def no_force(inp, _=0):
+    """Return the input with a sensor that feels nothing but its bias."""
+    scatter = (inp.tick * 7 % 11 - 5) * 0.01
+    readings = tuple(replace(r, force=tuple(b + scatter for b in BIAS[:3])) for r in inp.ft.readings)
+    return replace(inp, ft=replace(inp.ft, readings=readings))
+
+
+def resume(inp, _=0):
+    return replace(no_force(inp), operator=int(Operator.RESUME))
+
+
+def velocity(bench):
+    twist = bench.output.wanted_world
+    return twist.vx, twist.vy
+
+
+# --- start ---------------------------------------------------------------------------------------------------
+
+
+def quiet_devices():
+    """Name each way of a device not having spoken yet."""
+
+    def of(name, **changes):
+        return lambda inp: replace(inp, **{name: replace(getattr(inp, name), **changes)})
+
+    def old(name, key, ms):
+        return lambda inp: replace(inp, **{name: replace(getattr(inp, name), **{key: inp.now_ns - ms * 1_000_000})})
+
+    return {
+        "19 packets of the sensor": of("ft", packets_ok=19),
+        "arm not up": of("arm", link=1),
+        "19 packets of the arm": of("arm", packets=19),
+        "old arm record": old("arm", "published_ns", 101),
+        "no valid pose": of("base", pose_valid=False),
+        "19 poses": of("base", pose_seq=19),
+        "old pose": old("base", "pose_received_ns", 101),
+        "no odometry": of("base", odometry_seq=0),
+        "old odometry": old("base", "odometry_received_ns", 101),
+    }
+
+
+@pytest.mark.parametrize("name", quiet_devices())
+def test_nothing_begins_before_every_device_has_spoken(name):
+    silence = quiet_devices()[name]
+    bench = FoldBench()
+    for n in range(60):
+        bench.fold(lambda inp, _: silence(inp), n)
+    assert bench.state.control.phase == Phase.SETTLE
+    assert (bench.output.mode, bench.output.faults) == (Mode.SILENT, ())
+    bench.fold()
+    assert bench.state.control.phase == Phase.TARE
+    assert bench.output.mode == Mode.READY
+    assert bench.state.control.held_joints == bench.rig.arm.held_pose_rad
+
+
+def test_nothing_moves_before_the_approach():
+    bench = FoldBench()
+    while bench.state.control.phase < Phase.APPROACH:
+        assert bench.fold().command_body == BodyTwist() or bench.state.control.phase == Phase.APPROACH
+    assert bench.tick == 20 + 100  # 20 packets of each device, then a second of tare
+
+
+def test_a_saved_tare_starts_with_the_approach_and_its_own_joints():
+    bench = FoldBench()
+    bench.core = TickCore.of(bench.rig, in_contact=True)
+    joints = tuple(q + 0.004 for q in bench.rig.arm.held_pose_rad)
+    bench.state = TickState(ControlState(tared=True, bias_force=BIAS[:3], bias_torque=BIAS[3:], held_joints=joints))
+    bench.run_to(Phase.APPROACH)
+    assert bench.tick == 20
+    assert bench.state.control.held_joints == joints
+    bench.pose = Pose2D(-0.95, 0.0, 0.0)  # the ball at the object
+    bench.run_to(Phase.PUSH)
+    assert bench.state.control.bias_force == BIAS[:3]
+
+
+# --- approach ------------------------------------------------------------------------------------------------
+
+
+def test_the_approach_ramps_up_along_the_path_until_five_samples_of_force():
+    bench = FoldBench(("control.force_filter_tau_s=0",)).run_to(Phase.APPROACH)
+    speeds = []
+    while bench.state.control.phase == Phase.APPROACH:
+        bench.fold()
+        speeds.append(bench.state.control.speed)
+        if bench.state.control.phase == Phase.APPROACH:
+            assert velocity(bench) == pytest.approx((speeds[-1], 0.0), abs=1e-12)
+    assert speeds[:3] == pytest.approx([0.0005, 0.001, 0.0015], abs=1e-12)
+    assert max(speeds) == 0.05
+    assert bench.state.control.contact_run == 5
+    # 5 samples at 0.05 m/s and 100 Hz: the push begins 4 ticks of 0.5 mm behind the first touch.
+    assert bench.state.control.contact_from_m == pytest.approx(GAP_M + 4 * 0.0005, abs=0.0006)
+    assert bench.state.control.progress_m == 0.0
+
+
+def test_four_samples_are_no_contact():
+    bench = FoldBench(("control.force_filter_tau_s=0",)).run_to(Phase.APPROACH)
+    for n in range(40):
+        bench.force_path = (15.0, 0.0)
+        bench.fold(None if n % 5 else no_force)
+        assert bench.state.control.contact_run <= 4
+    assert bench.state.control.phase == Phase.APPROACH
+
+
+@pytest.mark.parametrize("force", [(15.0, 0.0), (0.0, 15.0), (-15.0, 0.0)])
+def test_contact_is_a_matter_of_size_not_of_direction(force):
+    bench = FoldBench().run_to(Phase.APPROACH)
+    bench.force_path = force
+    bench.run_to(Phase.PUSH)
+    assert bench.state.control.contact_seen
+
+
+def test_an_object_that_is_not_there_ends_the_run_at_rest_with_exit_6():
+    bench = FoldBench().run_to(Phase.APPROACH)
+    from_x = bench.pose.x
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    # 0.5 m beyond the expected 0.05 m, then braked
+    assert bench.pose.x - from_x == pytest.approx(0.55, abs=0.002)
+    assert bench.output.mode == Mode.HOLD
+    assert "F53" in bench.output.faults
+    ticks = bench.run_until(lambda b: b.output.finished, no_force)
+    assert 200 <= ticks <= 215
+    assert bench.output.exit_code == 6
+    assert bench.output.command_body == BodyTwist()
+    assert bench.state.control.phase == Phase.FAILED
+
+
+def test_the_operator_may_look_further():
+    bench = FoldBench().run_to(Phase.APPROACH)
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    bench.fold(resume)
+    assert bench.state.control.phase == Phase.APPROACH
+    from_x = bench.pose.x
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    assert bench.pose.x - from_x == pytest.approx(0.55, abs=0.01)
+
+
+# --- push ----------------------------------------------------------------------------------------------------
+
+
+def test_the_push_ramps_from_the_speed_of_the_approach_in_a_second():
+    bench = FoldBench().run_to(Phase.PUSH)
+    began = bench.tick
+    speeds = []
+    while bench.tick < began + 120:
+        bench.fold()
+        speeds.append(bench.state.control.speed)
+    assert speeds[0] == pytest.approx(0.05 + 0.05 * 0.01, abs=1e-9)
+    assert speeds[49] == pytest.approx(0.075, abs=1e-9)
+    assert speeds[99:] == [0.1] * 21
+
+
+def test_the_law_steers_in_the_world():
+    """Force 0.2 rad to the left, 0.1 m right of the path, k_f 0.3, k_y 0.2: 1.3 x 0.2 - 0.2 x 0.1 = 0.24 rad."""
+    bench = pushing(("control.force_filter_tau_s=0",))
+    bench.pose = replace(bench.pose, y=-0.1)
+    bench.force_path = (15.0 * math.cos(0.2), 15.0 * math.sin(0.2))
+    bench.fold()
+    assert bench.state.control.lateral_m == pytest.approx(-0.1, abs=1e-12)
+    assert bench.state.control.theta_f == pytest.approx(0.2, abs=4e-3)  # the bench's scatter of 0.05 N
+    assert bench.state.control.theta_p == pytest.approx(0.24, abs=5e-3)
+    theta_p = bench.state.control.theta_p
+    assert velocity(bench) == pytest.approx((0.1 * math.cos(theta_p), 0.1 * math.sin(theta_p)), abs=1e-12)
+
+
+def test_the_world_velocity_is_turned_by_the_measured_heading_and_the_heading_held():
+    bench = pushing()
+    bench.pose = replace(bench.pose, yaw=0.04)
+    bench.fold()
+    wanted = bench.output.wanted_body
+    theta_p = bench.state.control.theta_p
+    assert (wanted.vx, wanted.vy) == pytest.approx(
+        (0.1 * math.cos(theta_p - 0.04), 0.1 * math.sin(theta_p - 0.04)), abs=1e-12
+    )
+    assert wanted.omega == pytest.approx(-0.04, abs=1e-12)
+    bench.pose = replace(bench.pose, yaw=-0.08)
+    bench.fold()
+    assert bench.output.wanted_body.omega == pytest.approx(0.08, abs=1e-12)
+
+
+def test_the_open_loop_baseline_goes_straight_whatever_it_feels():
+    bench = pushing(('control.controller="open-loop"', "control.force_filter_tau_s=0"))
+    bench.force_path = (10.0, 10.0)
+    bench.pose = replace(bench.pose, y=0.02)
+    bench.fold()
+    assert bench.state.control.theta_f == pytest.approx(math.pi / 4, abs=0.01)
+    assert bench.state.control.theta_p == 0.0
+    assert velocity(bench) == pytest.approx((0.1, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_push_angle_beyond_90_degrees_is_a_fault_and_never_clipped(side):
+    """Force at 75 degrees, k_f 0.3: 97.5 degrees wanted. The direction stays as it was until the fault stops it."""
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+    before = bench.state.control.theta_p
+    angle = side * math.radians(75.0)
+    bench.force_path = (15.0 * math.cos(angle), 15.0 * math.sin(angle))
+    for n in range(19):
+        bench.fold()
+        assert bench.state.control.backward_ticks == n + 1
+        assert bench.output.faults == ()
+        assert bench.state.control.theta_p == before
+        assert bench.state.control.theta_f == pytest.approx(angle, abs=0.01)
+    bench.fold()
+    assert bench.output.faults == ("F56",)
+    assert bench.output.mode == Mode.STOP
+    assert bench.output.command_body == BodyTwist()
+
+
+def test_a_moment_beyond_90_degrees_is_forgiven():
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+    for _ in range(3):
+        bench.force_path = (15.0 * math.cos(1.4), 15.0 * math.sin(1.4))
+        for _ in range(19):
+            bench.fold()
+        bench.force_path = (15.0, 0.0)
+        bench.fold()
+        assert bench.state.control.backward_ticks == 0
+    assert bench.output.faults == ()
+
+
+def test_just_below_90_degrees_is_pushed():
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+    angle = math.radians(69.0)  # 1.3 x 69 = 89.7
+    bench.force_path = (15.0 * math.cos(angle), 15.0 * math.sin(angle))
+    for _ in range(30):
+        bench.fold()
+    assert bench.state.control.theta_p == pytest.approx(1.3 * angle, abs=0.01)
+    assert bench.output.faults == ()
+
+
+# --- the force is lost ---------------------------------------------------------------------------------------
+
+
+def lost(lateral=0.0, overrides=("control.force_filter_tau_s=0",)):
+    """Return a bench in its first tick of LOST, `lateral` m left of the path."""
+    bench = pushing(overrides)
+    if lateral:
+        bench.pose = replace(bench.pose, y=lateral)
+        bench.force_path = (15.0 * math.cos(0.1), 15.0 * math.sin(0.1))
+        bench.fold()
+    bench.fold(no_force)
+    assert bench.state.control.phase == Phase.LOST
+    return bench
+
+
+def test_without_force_the_law_is_not_evaluated_and_the_pusher_turns_back():
+    """2 cm left, k_y 0.2: the way back is -0.004 rad; turning there at 0.2 rad/s is 0.002 rad a tick."""
+    bench = pushing(("control.force_filter_tau_s=0",))
+    bench.pose = replace(bench.pose, y=0.02)
+    for _ in range(5):
+        bench.pose = replace(bench.pose, y=0.02)
+        bench.force_path = (15.0 * math.cos(0.05), 15.0 * math.sin(0.05))
+        bench.fold()
+    theta_f, theta_p = bench.state.control.theta_f, bench.state.control.theta_p
+    assert theta_p == pytest.approx(1.3 * 0.05 + 0.2 * 0.02, abs=0.005)
+    for n in range(1, 46):
+        bench.fold(no_force)
+        wanted = -0.2 * bench.state.control.lateral_m
+        assert bench.state.control.theta_f == theta_f
+        assert bench.state.control.theta_p == pytest.approx(max(theta_p - 0.002 * n, wanted), abs=1e-9)
+        assert bench.output.faults == ("F52",)
+        assert bench.output.mode == Mode.PUSHING
+    assert bench.state.control.theta_p == pytest.approx(-0.2 * bench.state.control.lateral_m, abs=1e-9)
+
+
+def test_the_search_ends_after_three_seconds():
+    bench = lost(overrides=("control.force_filter_tau_s=0", "control.lost_distance_m=2"))
+    ticks = bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    assert ticks == 300  # more than 3 s after the first tick of LOST
+
+
+def test_the_search_ends_after_thirty_centimetres():
+    bench = lost(overrides=("control.force_filter_tau_s=0", "control.lost_time_s=10"))
+    x = bench.state.control.anchor_x
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    assert bench.output.contact_x - x == pytest.approx(0.3, abs=0.0011)
+
+
+def test_at_the_default_speed_both_bounds_hold():
+    bench = lost()
+    ticks = bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    assert ticks in (299, 300)
+    assert bench.output.contact_x - bench.state.control.anchor_x <= 0.3011
+
+
+def test_then_it_holds_and_after_two_seconds_at_rest_the_push_has_failed():
+    bench = lost()
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    assert "F52-hold" in bench.output.faults
+    assert bench.output.mode == Mode.HOLD
+    rest = bench.run_until(lambda b: b.output.command_body == BodyTwist(), no_force)
+    assert rest <= 10  # 0.1 m/s at 1 m/s^2
+    ticks = bench.run_until(lambda b: b.output.finished, no_force)
+    assert 195 <= ticks <= 205
+    assert bench.output.exit_code == 6
+    assert bench.state.control.phase == Phase.FAILED
+    assert bench.state.control.end_progress_m == bench.state.control.progress_m > 0.2
+
+
+def test_a_force_that_comes_back_in_the_search_goes_on_pushing():
+    bench = lost()
+    for n in range(50):
+        bench.fold(no_force, n)
+    bench.fold()
+    assert bench.state.control.phase == Phase.PUSH
+    assert bench.output.faults == ()
+    bench.fold(no_force)  # lost again: a new search with all its time
+    ticks = bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    assert ticks >= 299
+
+
+def test_the_operator_resumes_the_search_and_the_push_goes_on():
+    bench = lost()
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    for n in range(100):
+        bench.fold(no_force, n)
+    bench.fold(resume)
+    assert bench.state.control.phase == Phase.LOST
+    bench.run_until(lambda b: b.output.command_body != BodyTwist(), no_force)
+    bench.run_until(lambda b: b.state.control.phase == Phase.PUSH)
+    bench.run_until(lambda b: b.output.finished)
+    assert bench.output.exit_code == 0
+    assert bench.state.control.end_progress_m == pytest.approx(2.0, abs=0.005)
+
+
+def test_an_operator_who_resumes_while_nothing_is_lost_changes_nothing():
+    bench, same = pushing(), pushing()
+    bench.fold(lambda inp, _: replace(inp, operator=int(Operator.RESUME)))
+    same.fold()
+    assert bench.state == same.state
+
+
+def test_an_old_force_is_no_force():
+    """With no packet for 100 ms the force is not valid, whatever it was."""
+    bench = pushing()
+    silent = lambda inp, _: replace(inp, ft=replace(inp.ft, readings=()))  # noqa: E731
+    ticks = bench.run_until(lambda b: not b.state.control.force_valid, silent)
+    assert ticks == 10
+    assert bench.state.control.phase == Phase.LOST
+    assert bench.state.control.force_world[0] > 14.0
+
+
+def test_a_force_that_is_no_number_is_no_force_and_the_next_good_one_starts_afresh():
+    bench = pushing()
+    bad = lambda inp, _: replace(  # noqa: E731
+        inp, ft=replace(inp.ft, readings=(replace(inp.ft.readings[0], force=(math.nan, 0.0, 0.0)),))
+    )
+    bench.fold(bad)
+    assert not bench.state.control.force_valid
+    assert bench.state.control.contact_run == 0
+    bench.fold()
+    assert bench.state.control.force_valid
+    assert bench.state.control.force_world == pytest.approx((15.0, 0.0, 0.0), abs=0.1)
+
+
+# --- the filter ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("split", [1, 2, 5])
+def test_the_filter_takes_each_packet_with_its_own_time(split):
+    """A step filtered over 50 ms (tau 0.05 s) has gone 1 - 1/e of its way, however many packets told of it."""
+    bench = pushing()
+    bench.force_path = (15.0, 0.0)
+    start = bench.state.control.force_world[0]
+
+    def burst(inp, _):
+        one = inp.ft.readings[0]
+        step = 10_000_000 // split
+        readings = tuple(
+            replace(one, received_ns=inp.now_ns - (split - 1 - i) * step, force=(BIAS[0], BIAS[1], BIAS[2] - 25.0))
+            for i in range(split)
+        )
+        return replace(inp, ft=replace(inp.ft, readings=readings))
+
+    for n in range(5):
+        bench.fold(burst, n)
+    assert bench.state.control.force_world[0] == pytest.approx(25.0 + (start - 25.0) * math.exp(-1.0), abs=0.05)
+
+
+# --- the end -------------------------------------------------------------------------------------------------
+
+
+def test_the_push_ends_on_its_distance_rests_retreats_and_checks_the_sensor():
+    bench = pushing()
+    phases, last_speeds = [], []
+    while not (bench.output and bench.output.finished):
+        bench.fold()
+        phase = Phase(bench.state.control.phase)
+        if phase == Phase.PUSH and bench.state.control.progress_m > 1.94:
+            last_speeds.append(bench.state.control.speed)
+        if not phases or phases[-1] != phase:
+            phases.append(phase)
+    assert phases == [Phase.PUSH, Phase.REST, Phase.RETREAT, Phase.CHECK, Phase.DONE]
+    assert last_speeds == sorted(last_speeds, reverse=True)  # the ramp down
+    assert last_speeds[-1] < 0.015
+    state = bench.state.control
+    assert 2.0 <= state.end_progress_m < 2.002
+    assert state.end_lateral_m == pytest.approx(0.0, abs=1e-3)
+    assert state.progress_m == pytest.approx(state.end_progress_m - 0.05, abs=0.002)
+    assert state.residual_N < 0.2
+    assert (bench.output.exit_code, bench.output.faults) == (0, ())
+
+
+def test_a_rig_may_do_without_the_retreat():
+    bench = pushing(("control.retreat_m=0",))
+    bench.run_until(lambda b: b.output.finished)
+    assert bench.output.exit_code == 0
+    assert bench.state.control.progress_m == pytest.approx(bench.state.control.end_progress_m, abs=1e-9)
+    assert math.isnan(bench.state.control.residual_N)
+
+
+def test_a_sensor_that_does_not_read_zero_afterwards_is_told():
+    bench = pushing()
+    bench.run_until(lambda b: b.state.control.phase == Phase.RETREAT)
+
+    def drifted(inp, _):
+        one = inp.ft.readings[0]
+        return replace(
+            inp, ft=replace(inp.ft, readings=(replace(one, force=(one.force[0] + 5.5, one.force[1], one.force[2])),))
+        )
+
+    bench.run_until(lambda b: b.output.finished, drifted)
+    assert bench.state.control.residual_N == pytest.approx(5.5, abs=0.2)
+    assert bench.output.faults == ("F09",)
+    assert bench.output.exit_code == 0
