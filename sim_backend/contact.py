@@ -10,13 +10,16 @@ from __future__ import annotations
 from math import ceil, cos, hypot, pi, remainder, sin
 from typing import Literal
 
+import msgspec
+
 from robot_io.errors import ConfigError
 from robot_io.messages import Pose2D
 from sim_backend.contact_geometry import Nearest, Outline
 from sim_backend.contact_outcome import FREE, ContactMode, ContactOutcome
-from sim_backend.corner import solve_at_corner
+from sim_backend.corner import CornerArguments, solve_at_corner
+from sim_backend.floor import Floor
 from sim_backend.slider import SliderModel
-from sim_backend.slider_exact import ContactSolution, ContactSolver, Moving, solve_exact
+from sim_backend.slider_exact import ContactSolution, ContactSolver, Grain, Moving, solve_exact
 
 __all__ = ["FREE", "ContactMode", "ContactOutcome", "PushedSlider"]
 
@@ -36,7 +39,8 @@ class PushedSlider:
     """The slider's pose and its contact with one ball.
 
     model: the slider. pose: x, y (m), heading (rad) of its body origin, WORLD frame. ball_radius_m: 0 (a point) or at
-    least 1 mm. solver: the closed form or OSQP. Raises ConfigError for a radius in between.
+    least 1 mm. solver: the closed form or OSQP. floor: what the floor does beyond the model's ellipsoid. Raises
+    ConfigError for a radius in between.
     """
 
     def __init__(
@@ -45,6 +49,7 @@ class PushedSlider:
         pose: tuple[float, float, float],
         ball_radius_m: float,
         solver: Literal["exact", "osqp"] = "exact",
+        floor: Floor | None = None,
     ) -> None:
         if not (ball_radius_m == 0.0 or SMALLEST_BALL_M <= ball_radius_m < float("inf")):
             raise ConfigError(
@@ -58,6 +63,9 @@ class PushedSlider:
         self._piece_m = min(LONGEST_PIECE_M, ball_radius_m / 2) if ball_radius_m else LONGEST_PIECE_M
         self._d, self._f_max, self._mu = model.d_m, model.f_max_N, model.contact_friction
         self._cof_x, self._cof_y = model.cof_m
+        self._grain: Grain | None = None
+        self._floor = floor
+        self._push_x = self._push_y = 0.0  # direction of the push force, BODY
         self.x_m, self.y_m, self.heading_rad = pose
         self._cos, self._sin = cos(self.heading_rad), sin(self.heading_rad)
         self._ball = (float("nan"), float("nan"))
@@ -125,6 +133,8 @@ class PushedSlider:
             left = (1.0 - done) * dt_s
             v_body_x = self._cos * vx + self._sin * vy
             v_body_y = self._cos * vy - self._sin * vx
+            if self._floor is not None:
+                self._take_grip(self._floor)
             if self._corner >= 0:
                 choice = solve_at_corner(
                     self._outline.rows, self._corner, self._solve, v_body_x, v_body_y, self._arguments()
@@ -147,11 +157,13 @@ class PushedSlider:
                     self._d,
                     self._f_max,
                     self._mu,
+                    self._grain,
                 )
             if not isinstance(solution, Moving):
                 # leaving, or brushing along the face without a normal motion: no force is needed for either
                 self._touching = False
                 return FREE
+            self._push_x, self._push_y = solution.fx, solution.fy
             outcome = self._outcome_of(solution)
             share = self._share_to_corner(solution.slip, left)
             self._move(solution, left * share)
@@ -180,11 +192,19 @@ class PushedSlider:
 
     def _take_contact(self, nearest: Nearest) -> None:
         _, self._nx, self._ny, self._cx, self._cy, self._face = nearest
+        self._push_x, self._push_y = self._nx, self._ny
         self._corner = -1
         if self._point_on_polygon:
             for corner, row in enumerate(self._outline.rows):
                 if hypot(row[7] - self._cx, row[8] - self._cy) < TOUCH_M:
                     self._corner, self._cx, self._cy = corner, row[7], row[8]
+
+    def _take_grip(self, floor: Floor) -> None:
+        """Ask the floor what holds the slider now; the push is along the last force, at a first touch the normal."""
+        size = hypot(self._push_x, self._push_y)
+        self._cof_x, self._cof_y, self._d, self._f_max, self._grain = floor.grip(
+            self.x_m, self.y_m, self._cos, self._sin, self._push_x / size, self._push_y / size
+        )
 
     def _move(self, solution: Moving, dt_s: float) -> None:
         """Turn and shift the slider by its twist about the centre of friction."""
@@ -244,15 +264,7 @@ class PushedSlider:
         last = self._outcome
         if not self._touching or last.mode in (ContactMode.FREE, ContactMode.HOLDING):
             return last if self._touching else FREE
-        return ContactOutcome(
-            ContactMode.HOLDING,
-            last.force_x,
-            last.force_y,
-            last.contact_x,
-            last.contact_y,
-            last.normal_x,
-            last.normal_y,
-        )
+        return msgspec.structs.replace(last, mode=ContactMode.HOLDING)
 
     def _outcome_of(self, solution: Moving) -> ContactOutcome:
         c, s = self._cos, self._sin
@@ -266,9 +278,9 @@ class PushedSlider:
             s * self._nx + c * self._ny,
         )
 
-    def _arguments(self) -> tuple[float, float, float, float, float]:
-        """Contact minus centre of friction (BODY), and the slider's constants."""
-        return (self._cx - self._cof_x, self._cy - self._cof_y, self._d, self._f_max, self._mu)
+    def _arguments(self) -> CornerArguments:
+        """Contact minus centre of friction (BODY), and what holds the slider."""
+        return (self._cx - self._cof_x, self._cy - self._cof_y, self._d, self._f_max, self._mu, self._grain)
 
     def _to_body(self, x: float, y: float) -> tuple[float, float]:
         dx, dy = x - self.x_m, y - self.y_m

@@ -114,7 +114,7 @@ def simulate_lane(
         vx = lane.speed_m_per_s * cos(theta_p - phi)
         vy = lane.speed_m_per_s * sin(theta_p - phi)
         min_ratio = min(min_ratio, (vx * nx + vy * ny) / lane.speed_m_per_s)
-        motion = solve(cx, cy, nx, ny, vx, vy, lane.d_m, lane.f_max_N, lane.contact_friction)
+        motion = solve(cx, cy, nx, ny, vx, vy, lane.d_m, lane.f_max_N, lane.contact_friction, None)
         if not isinstance(motion, Moving):
             end = LaneEnd.PULL
             break

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from robot_io.errors import ConfigError
 
 Point = tuple[float, float]
+Moment = tuple[float, float, float]
+"""Mean of x^2, xy, y^2 (m^2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +83,37 @@ class ConvexPolygon:
                 total += sign * h / 6 * (u * math.hypot(u, h) + h * h * math.asinh(u / h))
         return total / self.area_m2
 
+    def second_moment_m2(self) -> Moment:
+        """Mean of x^2, xy, y^2 of the area about its centroid, closed form (sum over the edges' triangles)."""
+        xx = xy = yy = 0.0
+        for a, b in _edges(self.corners):
+            cross = a[0] * b[1] - b[0] * a[1]
+            xx += cross * (a[0] * a[0] + a[0] * b[0] + b[0] * b[0])
+            yy += cross * (a[1] * a[1] + a[1] * b[1] + b[1] * b[1])
+            xy += cross * (2 * a[0] * a[1] + a[0] * b[1] + b[0] * a[1] + 2 * b[0] * b[1]) / 2
+        x, y = self.centroid_m
+        whole = 12 * self.area_m2
+        return (xx / whole - x * x, xy / whole - x * y, yy / whole - y * y)
+
+    def rim_points(self) -> tuple[Point, ...]:
+        """The corners farthest from the centroid."""
+        x, y = self.centroid_m
+        farthest = self.greatest_distance_m((x, y))
+        return tuple(c for c in self.corners if math.hypot(c[0] - x, c[1] - y) > farthest * (1 - 1e-9))
+
+    def grid_points(self, across: int) -> tuple[Point, ...]:
+        """Points spread evenly over the area: those of an `across` x `across` grid of its bounding box inside it."""
+        xs, ys = [c[0] for c in self.corners], [c[1] for c in self.corners]
+        points = (
+            (
+                min(xs) + (i + 0.5) / across * (max(xs) - min(xs)),
+                min(ys) + (j + 0.5) / across * (max(ys) - min(ys)),
+            )
+            for i in range(across)
+            for j in range(across)
+        )
+        return tuple(p for p in points if self.contains(p))
+
     def greatest_distance_m(self, point: Point) -> float:
         """Distance of the farthest corner from a point."""
         return max(math.hypot(c[0] - point[0], c[1] - point[1]) for c in self.corners)
@@ -144,6 +177,20 @@ class Circle:
         angles = (2 * math.pi * i / samples for i in range(samples))
         reach = (math.sqrt(self.radius_m**2 - (e * math.sin(a)) ** 2) - e * math.cos(a) for a in angles)
         return math.fsum(r**3 for r in reach) * (2 * math.pi / samples) / 3 / self.area_m2
+
+    def second_moment_m2(self) -> Moment:
+        """Mean of x^2, xy, y^2 of the area about the middle."""
+        return (self.radius_m**2 / 4, 0.0, self.radius_m**2 / 4)
+
+    def rim_points(self) -> tuple[Point, ...]:
+        """Twelve points around the rim."""
+        angles = (2 * math.pi * i / 12 for i in range(12))
+        return tuple((self.radius_m * math.cos(a), self.radius_m * math.sin(a)) for a in angles)
+
+    def grid_points(self, across: int) -> tuple[Point, ...]:
+        """Points spread evenly over the area: those of an `across` x `across` grid of its bounding box inside it."""
+        places = [(2 * (i + 0.5) / across - 1) * self.radius_m for i in range(across)]
+        return tuple((x, y) for x in places for y in places if self.contains((x, y)))
 
     def greatest_distance_m(self, point: Point) -> float:
         """Distance of the farthest edge point from a point."""

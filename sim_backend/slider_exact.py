@@ -2,15 +2,16 @@
 
 Contact frame: n the inward unit normal, t = (-n_y, n_x). With c the contact minus the centre of friction, J = (c x n,
 c . n) and d = tau_max/f_max, the velocity of the slider at the contact is w = A h, A = I + J J'/d^2, where h is the
-contact force up to a positive factor. At a given normal velocity the program's feasible set is a line along which
-the slip falls strictly with h_t, so its solution is the sticking h_t clipped to the friction cone.
+contact force up to a positive factor. (On a floor with a grain, its matrix P stands for I, and the slider moves along
+P h.) At a given normal velocity the program's feasible set is a line along which the slip falls strictly with h_t, so
+its solution is the sticking h_t clipped to the friction cone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from math import hypot
+from math import hypot, sqrt
 
 import msgspec
 
@@ -56,8 +57,11 @@ class AtRest(msgspec.Struct, frozen=True, gc=False):
 
 
 ContactSolution = Moving | Separating | AtRest
-ContactSolver = Callable[[float, float, float, float, float, float, float, float, float], ContactSolution]
-"""cx, cy, nx, ny, vx, vy, d_m, f_max_N, contact_friction -> solution, all in BODY axes (see `solve_exact`)."""
+Grain = tuple[float, float, float]
+"""Floor that resists more one way than another: xx, xy, yy (BODY) of the symmetric matrix that turns a force into the
+direction of travel, the unit matrix for a floor alike in all directions; f_max_N is the force where it is 1."""
+ContactSolver = Callable[[float, float, float, float, float, float, float, float, float, Grain | None], ContactSolution]
+"""cx, cy, nx, ny, vx, vy, d_m, f_max_N, contact_friction, grain -> solution, BODY axes (see `solve_exact`)."""
 
 SEPARATING = Separating()
 
@@ -72,6 +76,7 @@ def solve_exact(
     d_m: float,
     f_max_N: float,
     contact_friction: float,
+    grain: Grain | None = None,
 ) -> ContactSolution:
     """Return how the slider answers a pusher velocity (m/s) at a contact, all in BODY axes.
 
@@ -87,13 +92,21 @@ def solve_exact(
     jn = cx * ny - cy * nx
     jt = cx * nx + cy * ny
     dd = d_m * d_m
-    ann = 1.0 + jn * jn / dd
-    ant = jn * jt / dd
-    att = 1.0 + jt * jt / dd
-    stick_t = ann * vt - ant * vn  # h_t of sticking, times det A (at least 1)
+    if grain is None:
+        pnn, pnt, ptt = 1.0, 0.0, 1.0
+        det = 1.0 + (jn * jn + jt * jt) / dd
+    else:
+        pxx, pxy, pyy = grain
+        pnn = pxx * nx * nx + 2.0 * pxy * nx * ny + pyy * ny * ny
+        pnt = (pyy - pxx) * nx * ny + pxy * (nx * nx - ny * ny)
+        ptt = pxx * ny * ny - 2.0 * pxy * nx * ny + pyy * nx * nx
+        det = pxx * pyy - pxy * pxy + (ptt * jn * jn - 2.0 * pnt * jn * jt + pnn * jt * jt) / dd
+    ann = pnn + jn * jn / dd
+    ant = pnt + jn * jt / dd
+    att = ptt + jt * jt / dd
+    stick_t = ann * vt - ant * vn  # h_t of sticking, times det A
     g_left = ann + contact_friction * ant
     g_right = ann - contact_friction * ant
-    det = 1.0 + (jn * jn + jt * jt) / dd
     limit = contact_friction * vn * det
     # a bound whose g is not positive does not bound: that side of the cone is wide
     if g_left > 0.0 and stick_t * g_left > limit:
@@ -112,10 +125,14 @@ def solve_exact(
         ht = stick_t / det
         slip = 0.0
     turn = (jn * hn + jt * ht) / d_m
-    size = hypot(hn, ht, turn)
+    if grain is None:
+        un, ut, size = hn, ht, hypot(hn, ht, turn)
+    else:
+        un, ut = pnn * hn + pnt * ht, pnt * hn + ptt * ht
+        size = sqrt(max(hn * un + ht * ut, 0.0) + turn * turn)
     if size < TINY:
         return AtRest(slip)
     scale = f_max_N / size
     fn = hn * scale
     ft = ht * scale
-    return Moving(mode, hn * nx - ht * ny, hn * ny + ht * nx, turn / d_m, slip, fn * nx - ft * ny, fn * ny + ft * nx)
+    return Moving(mode, un * nx - ut * ny, un * ny + ut * nx, turn / d_m, slip, fn * nx - ft * ny, fn * ny + ft * nx)

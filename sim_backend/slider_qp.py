@@ -6,14 +6,14 @@ size the program is well conditioned for every slider. One solver object is reus
 
 from __future__ import annotations
 
-from math import hypot, isfinite
+from math import hypot, isfinite, sqrt
 
 import numpy as np
 import osqp
 from scipy import sparse
 
 from robot_io.errors import PushError
-from sim_backend.slider_exact import SEPARATING, AtRest, ContactSolution, Moving, Sliding
+from sim_backend.slider_exact import SEPARATING, AtRest, ContactSolution, Grain, Moving, Sliding
 
 TOLERANCE = 1e-10
 """Residuals OSQP must reach, at unit pusher speed."""
@@ -68,6 +68,7 @@ class QpSolver:
         d_m: float,
         f_max_N: float,
         contact_friction: float,
+        grain: Grain | None = None,
     ) -> ContactSolution:
         """Return the same as `slider_exact.solve_exact`, to about 1e-9 of the pusher's speed."""
         vn = vx * nx + vy * ny
@@ -79,9 +80,15 @@ class QpSolver:
             return AtRest(0.0)
         jn = cx * ny - cy * nx
         jt = cx * nx + cy * ny
-        # A^-1 = I - J J'/(d^2 + |J|^2)
-        inner = 1.0 / (d_m * d_m + jn * jn + jt * jt)
-        inn, int_, itt = 1.0 - jn * jn * inner, -jn * jt * inner, 1.0 - jt * jt * inner
+        pxx, pxy, pyy = grain or (1.0, 0.0, 1.0)
+        p = np.array([[pxx, pxy], [pxy, pyy]])
+        axes = np.array([[nx, ny], [-ny, nx]])
+        (pnn, pnt), (_, ptt) = (axes @ p @ axes.T).tolist()
+        # A^-1 by its adjugate: A = P + J J'/d^2
+        dd = d_m * d_m
+        ann, ant, att = pnn + jn * jn / dd, pnt + jn * jt / dd, ptt + jt * jt / dd
+        det = pxx * pyy - pxy * pxy + (ptt * jn * jn - 2 * pnt * jn * jt + pnn * jt * jt) / dd
+        inn, int_, itt = att / det, -ant / det, ann / det
         left_n, left_t = contact_friction * inn + int_, contact_friction * int_ + itt
         right_n, right_t = contact_friction * inn - int_, contact_friction * int_ - itt
         left, right = hypot(left_n, left_t), hypot(right_n, right_t)
@@ -96,13 +103,14 @@ class QpSolver:
         hn = inn * wn + int_ * wt
         ht = int_ * wn + itt * wt
         turn = (jn * hn + jt * ht) / d_m
-        size = hypot(hn, ht, turn)
+        un, ut = pnn * hn + pnt * ht, pnt * hn + ptt * ht
+        size = sqrt(max(hn * un + ht * ut, 0.0) + turn * turn)
         if size < AT_REST:
             return AtRest(slip * speed)
         mode = Sliding.STICKING if abs(slip) < AT_REST else Sliding.LEFT if slip > 0 else Sliding.RIGHT
         fn, ft = hn * f_max_N / size, ht * f_max_N / size
-        hn, ht = hn * speed, ht * speed
+        un, ut = un * speed, ut * speed
         omega = turn * speed / d_m
         return Moving(
-            mode, hn * nx - ht * ny, hn * ny + ht * nx, omega, slip * speed, fn * nx - ft * ny, fn * ny + ft * nx
+            mode, un * nx - ut * ny, un * ny + ut * nx, omega, slip * speed, fn * nx - ft * ny, fn * ny + ft * nx
         )

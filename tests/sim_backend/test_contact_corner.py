@@ -16,7 +16,7 @@ TOP_LEFT = 0
 
 
 def at_top_left(vx, vy, d=0.38, mu=0.3):
-    return solve_at_corner(SQUARE, TOP_LEFT, solve_exact, vx, vy, (-0.5, 0.5, d, 1.0, mu))
+    return solve_at_corner(SQUARE, TOP_LEFT, solve_exact, vx, vy, (-0.5, 0.5, d, 1.0, mu, None))
 
 
 @pytest.mark.parametrize("velocity", [(0.1, 0.01), (0.1, 0.0), (-0.01, -0.1), (0.0, -0.1), (-0.1, 0.1)])
@@ -37,7 +37,7 @@ def test_a_corner_the_contact_slides_over_continues_on_the_next_face():
     # the corner (-0.5, -0.1) lies below the centre of friction, so a push along +x turns it down and the contact up
     shape = ConvexPolygon(((-0.5, -0.1), (-0.5, -0.6), (0.5, -0.6), (0.5, 0.5)))
     rows = Outline(shape).rows
-    motion, nx, ny, face = solve_at_corner(rows, 0, solve_exact, 0.1, 0.0, (-0.5, -0.1, 0.3, 1.0, 0.0))
+    motion, nx, ny, face = solve_at_corner(rows, 0, solve_exact, 0.1, 0.0, (-0.5, -0.1, 0.3, 1.0, 0.0, None))
     assert face == 3
     assert motion.mode is Sliding.LEFT
     assert (nx, ny) == pytest.approx((0.6 / math.hypot(1, 0.6), -1 / math.hypot(1, 0.6)))

@@ -1,0 +1,88 @@
+"""How large k_y may be before a straight push begins to weave: the linear stability of the law, in closed form.
+
+Linearised about the straight push, with rho from contact to centre of mass along the push, d the length that resists
+turning (mean square distance of the pressure along the push, or tau_max/f_max), R the ball's radius, L the pressure's
+shift (floor friction times push height) and a the floor's friction along over across the path; kappa = k_f + 1 - a^2:
+
+    box, sticking        k_y < kappa (rho - R) / (a^2 d^2 + rho (rho + L))
+    box, frictionless    (H/d^2 - k_y)(kappa - H k_y) > a^2 k_y,   H = rho + L + R
+    circle, sticking     k_y < kappa rho^2/(rho + R) / (a^2 d^2 + rho (rho + L))
+    circle, frictionless k_y < kappa / (rho + R)
+
+The law's y_c is of the ball's centre. Derived here; R = 0, L = 0, a = 1 give the paper's point pusher on an even floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import radians, sqrt
+
+import msgspec
+
+WARN_SHARE = 0.7
+"""Gains beyond this share of the limit leave too little for what is not modelled."""
+
+
+class PushedBody(msgspec.Struct, frozen=True):
+    """One slider as the limits see it: m. `rho_m`: half its length along the push, or its radius."""
+
+    round: bool
+    rho_m: float
+    d_m: float
+    ball_radius_m: float = 0.0
+    shift_m: float = 0.0
+    along_over_across: float = 1.0
+
+
+def sticking_limit(body: PushedBody, k_f: float) -> float:
+    """Return the greatest stable k_y (rad/m) while the contact sticks; 0 or less: none is stable."""
+    kappa = _kappa(body, k_f)
+    rho, ball = body.rho_m, body.ball_radius_m
+    lever = rho * rho / (rho + ball) if body.round else rho - ball
+    return kappa * lever / (body.along_over_across**2 * body.d_m**2 + rho * (rho + body.shift_m))
+
+
+def frictionless_limit(body: PushedBody, k_f: float) -> float:
+    """Return the greatest stable k_y (rad/m) of a contact without friction; 0 or less: none is stable."""
+    kappa = _kappa(body, k_f)
+    rho, ball = body.rho_m, body.ball_radius_m
+    if body.round:
+        return kappa / (rho + ball)
+    if kappa <= 0:
+        return kappa
+    reach = rho + body.shift_m + ball
+    per_d2 = 1 / body.d_m**2
+    # reach k_y^2 - b k_y + c > 0 below its smaller root
+    b = reach * reach * per_d2 + kappa + body.along_over_across**2
+    c = reach * kappa * per_d2
+    return 2 * c / (b + sqrt(max(b * b - 4 * reach * c, 0.0)))
+
+
+def limit(bodies: Iterable[PushedBody], k_f: float) -> float:
+    """Return the greatest k_y (rad/m) that is stable for every body, whatever the contact friction."""
+    return min(min(sticking_limit(body, k_f), frictionless_limit(body, k_f)) for body in bodies)
+
+
+def fast_loop_k_f(bodies: Iterable[PushedBody]) -> float:
+    """Return the k_f above which the force angle itself runs away from sample to sample while the contact sticks.
+
+    The force angle answers the pushing angle with the slope 1 / (a^2 + rho (rho + L) / d^2), and the law feeds it
+    back with k_f + 1: their product must stay below 1.
+    """
+    return min(
+        body.along_over_across**2 + body.rho_m * (body.rho_m + body.shift_m) / body.d_m**2 - 1 for body in bodies
+    )
+
+
+def offset_per_degree_m(k_f: float, k_y_rad_per_m: float) -> float:
+    """Return the steady lateral offset (m) that one degree of error in the force's angle costs."""
+    return (1 + k_f) / k_y_rad_per_m * radians(1)
+
+
+def offset_per_newton_m(k_f: float, k_y_rad_per_m: float, slide_force_N: float) -> float:
+    """Return the steady lateral offset (m) that one newton of lateral bias costs at a given sliding force."""
+    return (1 + k_f) / k_y_rad_per_m / slide_force_N
+
+
+def _kappa(body: PushedBody, k_f: float) -> float:
+    return k_f + 1 - body.along_over_across**2

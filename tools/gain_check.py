@@ -1,0 +1,64 @@
+"""The limits of `sim_backend.gain_limits` found again by simulation: where a small weave begins to grow.
+
+The simulated push is the world's own (`contact.PushedSlider` with its floor), the law steps with the force of the step
+before, and the growth rate of a small weave is followed through zero.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, log, sin
+
+from sim_backend.contact import PushedSlider
+from sim_backend.floor import Floor, FloorEffects
+from sim_backend.gain_limits import PushedBody
+from sim_backend.shapes import Circle, Rectangle
+from sim_backend.slider import SliderModel
+
+STEP_S = 0.004
+SPEED_M_PER_S = 0.1
+START_OFFSET_M = 1e-4
+"""Small, so that the weave stays linear."""
+SWINGS = 6
+"""Extremes of the weave that are compared, after the first ones."""
+LONGEST_S = 2000.0
+STICKING_FRICTION = 2.0
+
+
+def simulated_limit(body: PushedBody, k_f: float, *, frictionless: bool, near: float) -> float:
+    """Return the k_y (rad/m) at which the growth rate of a small weave is 0, searched from `near`."""
+    low, high = 0.97 * near, 1.03 * near
+    rate_low, rate_high = (growth_rate(body, k_f, k_y, frictionless=frictionless) for k_y in (low, high))
+    for _ in range(2):  # secant: the rate is almost straight in k_y
+        middle = low - rate_low * (high - low) / (rate_high - rate_low)
+        low, rate_low = (high, rate_high) if abs(high - middle) < abs(low - middle) else (low, rate_low)
+        high, rate_high = middle, growth_rate(body, k_f, middle, frictionless=frictionless)
+    return low - rate_low * (high - low) / (rate_high - rate_low)
+
+
+def growth_rate(body: PushedBody, k_f: float, k_y_rad_per_m: float, *, frictionless: bool) -> float:
+    """Return the rate (1/s) at which a small weave grows, from the extremes of the ball's lateral place."""
+    slider = _slider(body, 0.0 if frictionless else STICKING_FRICTION)
+    x, y = -body.rho_m - body.ball_radius_m, START_OFFSET_M
+    fx, fy, t = 1.0, 0.0, 0.0
+    extremes: list[tuple[float, float]] = []
+    old_dy = 0.0
+    while len(extremes) < SWINGS + 2 and t < LONGEST_S:
+        theta_p = (k_f + 1) * atan2(fy, fx) + k_y_rad_per_m * y
+        dx, dy = SPEED_M_PER_S * STEP_S * cos(theta_p), SPEED_M_PER_S * STEP_S * sin(theta_p)
+        outcome = slider.step((x, y), (x + dx, y + dy), STEP_S)
+        x, y, t = x + dx, y + dy, t + STEP_S
+        fx, fy = outcome.force_x, outcome.force_y
+        if old_dy * dy < 0:
+            extremes.append((t, abs(y)))
+        old_dy = dy
+    if len(extremes) < 4:
+        return log(max(abs(y), 1e-300) / START_OFFSET_M) / t  # no weave: it only runs off or comes back
+    (t_first, first), (t_last, last) = extremes[2], extremes[-1]
+    return log(last / first) / (t_last - t_first)
+
+
+def _slider(body: PushedBody, contact_friction: float) -> PushedSlider:
+    shape = Circle(body.rho_m) if body.round else Rectangle(2 * body.rho_m, 2 * body.rho_m)
+    model = SliderModel(shape, 1.0, body.d_m, contact_friction)
+    effects = FloorEffects(shift_m=body.shift_m, along_over_across=body.along_over_across)
+    return PushedSlider(model, (0.0, 0.0, 0.0), body.ball_radius_m, floor=Floor(model, "uniform", effects))
