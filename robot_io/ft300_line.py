@@ -17,15 +17,14 @@ from typing import Protocol
 
 import serial
 from serial.tools import list_ports
-from serial.urlhandler import protocol_socket
 
 from robot_io.errors import DeviceUnreachable, UsageError
+from robot_io.ft300_tcp import TcpPort
 
 BAUD = 19_200
 ANSWER_TIMEOUT_S = 0.3
 """Wait for a Modbus answer: 9 ms on the wire, up to 32 ms in a slow USB adapter, the rest is margin."""
 WRITE_TIMEOUT_S = 0.5
-CONNECT_TIMEOUT_S = 2.0
 SILENCE_S = 0.1
 """A streaming sensor sends every 10 ms; 100 ms without a byte is a stopped one (Robotiq's driver waits 84 ms)."""
 BURST = b"\xff" * 20
@@ -64,10 +63,9 @@ class SerialLine:
         self.port = port
         if "://" in port and not port.startswith("socket://"):
             raise UsageError(f"{port!r} is no port of an FT 300", do="Give a device path or socket://host:port")
-        # pyserial offers no other way to bound a connection that is neither accepted nor refused.
-        protocol_socket.POLL_TIMEOUT = CONNECT_TIMEOUT_S
+        make = TcpPort if "://" in port else serial.Serial
         try:
-            self.serial: _Port = serial.serial_for_url(
+            self.serial: _Port = make(
                 port, BAUD, timeout=ANSWER_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True
             )
         except LINE_ERRORS as error:
@@ -86,11 +84,7 @@ class SerialLine:
 
     def close(self) -> None:
         """Release the port; idempotent."""
-        # pyserial forgets its socket without closing it when the peer went first.
-        left_open = getattr(self.serial, "_socket", None)
         self.serial.close()
-        if left_open is not None:
-            left_open.close()
 
     def set_wake_bytes(self, count: int) -> None:
         """Report the port as readable from `count` waiting bytes on (VMIN; a socket always does from 1).

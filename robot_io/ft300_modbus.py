@@ -48,12 +48,12 @@ class Ft300Registers:
     def identify(self) -> DeviceInfo:
         """Bring the sensor to Modbus mode and return who it is.
 
-        A line that talks is told to stop; the second try sends the stop bytes to a silent line as well. Raises
+        A line that talks is told to stop, and so is one that did not answer the first try. Raises
         DeviceUnreachable (no answer) or DeviceProtocolError (not an FT 300).
         """
         failure: Exception | None = None
-        for attempt in range(IDENTIFY_ATTEMPTS):
-            if attempt or not self._line.is_silent():
+        for _ in range(IDENTIFY_ATTEMPTS):
+            if not self._line.is_silent() or isinstance(failure, minimalmodbus.NoResponseError):
                 self._stop_stream()
             try:
                 firmware = self._read(REG_FIRMWARE, 3)

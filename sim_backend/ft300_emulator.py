@@ -170,8 +170,9 @@ class Ft300Emulator:
         self._schedule_delivery()
 
     def _schedule_delivery(self) -> None:
-        arrival_ns = self._to_host.next_ns()
-        if arrival_ns is not None and "deliver" not in self._timers:
+        # While nobody listens, one wake-up a packet will do.
+        arrival_ns = self._to_host.next_ns() if self._port.attached else self._to_host.free_ns
+        if len(self._to_host) and arrival_ns is not None and "deliver" not in self._timers:
             self._at("deliver", next_delivery_ns(arrival_ns, self.latency_ms), self._on_delivery)
 
     def _on_delivery(self, deadline_ns: int) -> None:

@@ -35,6 +35,7 @@ class PtyPort:
         self._link = Path(link) if link else None
         self._master = -1
         self._look: Timer | None = None
+        self._hang_up_poll = select.poll()
         self._paused = False
         self.path = ""
         self.attached = False
@@ -55,6 +56,8 @@ class PtyPort:
         self.path = os.ttyname(slave)
         os.close(slave)
         os.set_blocking(self._master, False)
+        self._hang_up_poll = select.poll()
+        self._hang_up_poll.register(self._master, 0)  # a hang-up is reported unasked
         if self._link is not None:
             beside = self._link.with_name(f"{self._link.name}.{os.getpid()}")
             beside.symlink_to(self.path)
@@ -109,9 +112,7 @@ class PtyPort:
 
     def _on_look(self, _deadline_ns: int) -> None:
         """See whether somebody opened the slave: the hang-up is gone (a client that only listens sends nothing)."""
-        poller = select.poll()
-        poller.register(self._master, select.POLLIN)
-        if any(events & select.POLLHUP for _, events in poller.poll(0)):
+        if any(events & select.POLLHUP for _, events in self._hang_up_poll.poll(0)):
             return
         assert self._look is not None
         self._look.cancel()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pty
 import select
 import socket
+import threading
 import time
 import tty
 from pathlib import Path
@@ -14,7 +16,7 @@ import pytest
 import serial
 
 from robot_io import ft300_line
-from robot_io.errors import DeviceNotReady, DeviceProtocolError, DeviceUnreachable, UsageError
+from robot_io.errors import DeviceError, DeviceNotReady, DeviceProtocolError, DeviceUnreachable, UsageError
 from robot_io.ft300 import Ft300
 from robot_io.messages import LinkState
 from tests.wire.ft300_process import ft300_process, until
@@ -196,7 +198,7 @@ def test_no_permission_names_the_group(monkeypatch):
     def refuse(*_args, **_kwargs):
         raise serial.SerialException(13, "could not open port")
 
-    monkeypatch.setattr(ft300_line.serial, "serial_for_url", refuse)  # as root nothing is forbidden
+    monkeypatch.setattr(ft300_line.serial, "Serial", refuse)  # as root nothing is forbidden
     with pytest.raises(DeviceUnreachable, match="may not open") as caught:
         Ft300("/dev/ttyUSB0").open()
     assert "dialout" in caught.value.do
@@ -240,14 +242,65 @@ def test_another_firmware_is_another_device():
         assert emulator.counters()["starts"] == 0
 
 
-@pytest.mark.parametrize("unknown", ["exception", "silence"])
-def test_a_sensor_without_the_wanted_registers_is_refused(unknown):
-    with ft300_process(knobs={"unknown": unknown}) as emulator:
-        port = serial.Serial(emulator.port, 19200, timeout=0.3)
-        port.write(bytes.fromhex("09 03 00 00 00 01 85 42"))
-        answer = port.read(5)
-        port.close()
-        assert answer == (bytes.fromhex("09 83 02 41 33") if unknown == "exception" else b"")
+class Imposter:
+    """Something else on a pty that answers every write with the same bytes."""
+
+    def __init__(self, answer):
+        self.answer = answer
+        self.master, self.slave = pty.openpty()
+        tty.setraw(self.slave)
+        self.port = os.ttyname(self.slave)
+        self.done = threading.Event()
+        self.thread = threading.Thread(target=self.serve)
+
+    def serve(self):
+        while not self.done.is_set():
+            if select.select([self.master], [], [], 0.02)[0]:
+                os.read(self.master, 4096)
+                os.write(self.master, self.answer)
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.done.set()
+        self.thread.join()
+        os.close(self.master)
+        os.close(self.slave)
+
+
+@pytest.mark.parametrize(
+    "answer", [bytes.fromhex("09 83 02 41 33"), b"READY\r\n\r\n", bytes.fromhex("01 03 02 46 54 6A 1A 00 00 00 00")]
+)
+def test_a_device_that_answers_otherwise_is_named_as_such(answer):
+    with Imposter(answer) as imposter:
+        with pytest.raises(DeviceProtocolError, match="answers, but not as an FT 300") as caught:
+            Ft300(imposter.port).open()
+        assert "which device" in caught.value.do
+
+
+@pytest.mark.long
+def test_a_tcp_peer_that_never_falls_silent_ends_the_opening_in_time():
+    done = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def flood():
+            client, _ = listener.accept()
+            with client, contextlib.suppress(OSError):
+                while not done.is_set():
+                    client.sendall(b" N" * 32768)
+
+        thread = threading.Thread(target=flood)
+        thread.start()
+        started_s = time.monotonic()
+        try:
+            with pytest.raises(DeviceError):
+                Ft300(f"socket://127.0.0.1:{listener.getsockname()[1]}").open()
+        finally:
+            done.set()
+            thread.join()
+        assert time.monotonic() - started_s < 5
 
 
 def test_a_sensor_that_stops_answering_at_the_start_needs_a_power_cycle():

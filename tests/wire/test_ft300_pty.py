@@ -166,6 +166,18 @@ def test_after_a_stop_it_is_deaf_for_a_while_and_answers_then():
         os.close(fd)
 
 
+@pytest.mark.parametrize("unknown", ["exception", "silence"])
+def test_unknown_registers_are_refused_or_met_with_silence(unknown):
+    with ft300_process(knobs={"unknown": unknown}) as emulator:
+        fd = open_port(emulator.port)
+        os.write(fd, bytes.fromhex("09 03 00 00 00 01 85 42"))
+        expected = bytes.fromhex("09 83 02 41 33") if unknown == "exception" else b""
+        assert read_for(fd, 5, 3.0 if expected else 0.3) == expected
+        os.write(fd, READ_FIRMWARE)
+        assert read_for(fd, 7) == FIRMWARE
+        os.close(fd)
+
+
 def test_a_port_whose_speed_nobody_set_gives_garbage():
     with ft300_process(streaming=True) as emulator:
         fd = open_port(emulator.port, set_speed=False)

@@ -1,0 +1,33 @@
+"""A serial server over TCP as pyserial sees it, with its unbounded habits mended."""
+
+from __future__ import annotations
+
+import select
+
+from serial.urlhandler import protocol_socket
+
+CONNECT_TIMEOUT_S = 2.0
+MOST_READS = 16
+
+
+class TcpPort(protocol_socket.Serial):
+    """`socket://host:port`; connecting, flushing and closing end whatever the peer does."""
+
+    def open(self) -> None:
+        """Connect within 2 s. Raises SerialException."""
+        # pyserial offers no other way to bound a connection that is neither accepted nor refused.
+        protocol_socket.POLL_TIMEOUT = CONNECT_TIMEOUT_S
+        super().open()
+
+    def reset_input_buffer(self) -> None:
+        """Throw away what has come, at most 64 kB (pyserial goes on while the peer does). Raises OSError."""
+        for _ in range(MOST_READS):
+            if not select.select([self._socket], [], [], 0)[0] or not self._socket.recv(4096):
+                return
+
+    def close(self) -> None:
+        """Release the socket (pyserial forgets it open when the peer went first)."""
+        left_open = self._socket if self.is_open else None
+        super().close()
+        if left_open is not None:
+            left_open.close()
