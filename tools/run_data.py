@@ -180,7 +180,8 @@ class _Reader:
         elif topic == "/world/state" and self._world.wants():
             slider = STATE_CDR.decode(payload).slider
             self._world.add((time_s, slider.x, slider.y, slider.yaw))
-        elif topic == "/slider/pose" and self._seen.wants():
+        # A simulated run's /slider/pose is made of the world's state, so the world goes first.
+        elif topic == "/slider/pose" and not len(self._world) and self._seen.wants():
             pose = POSE_STAMPED.decode(payload).pose
             turned = pose.orientation
             yaw = yaw_from_quaternion(turned.x, turned.y, turned.z, turned.w)
@@ -193,7 +194,6 @@ class _Reader:
             raise self._foreign("it holds no config.toml")
         last = TICK_CDR.decode(self._last_payload) if self._last_payload else None
         recovered = self.metadata.get("recovered")
-        # A simulated run's /slider/pose is made of the world's state, so the world goes first.
         ticks, world, seen = self._ticks.arrays(), self._world.arrays(), self._seen.arrays()
         for table in (ticks, world, seen):
             table["t_s"] -= self._first_tick_s
