@@ -209,17 +209,16 @@ def main() -> int:
     set_timer_slack_1ns()
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=GateJob)
     status = StatusPipe(job.status_fd)
-    base = Ridgeback(
-        job.base.url,
-        topics=job.base.topics,
-        pose_source=job.base.pose_source,
-        base_from_marker=job.frames.base_from_marker,
-    )
     try:
+        base = Ridgeback(
+            job.base.url,
+            topics=job.base.topics,
+            pose_source=job.base.pose_source,
+            base_from_marker=job.frames.base_from_marker,
+        )
         info = base.open()
         base.start()
-    except PushError as error:
-        base.close()
+    except PushError as error:  # the process ends, and with it whatever was open
         status.error(error)
         return error.exit_code
     process = GateProcess(job, base, status)

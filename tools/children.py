@@ -1,4 +1,4 @@
-"""Child processes of a run: fresh interpreters, a job on stdin, JSON lines back, watched by pidfd."""
+"""Child processes of a run: fresh interpreters, a job on stdin, JSON lines back."""
 
 from __future__ import annotations
 
@@ -11,8 +11,12 @@ import tempfile
 from typing import IO, Any
 
 import msgspec
+from msgspec.structs import replace
 
 from robot_io.status_pipe import StatusReader
+
+MOST_WORDS = 65_536
+"""Bytes of a process's stderr that are looked at: its end."""
 
 
 class Child:
@@ -21,7 +25,6 @@ class Child:
     def __init__(self, name: str, process: subprocess.Popen[bytes], status_fd: int, stderr: IO[bytes]) -> None:
         self.name = name
         self.process = process
-        self.pidfd = os.pidfd_open(process.pid)
         self.status = StatusReader(status_fd)
         self.ready: dict[str, Any] | None = None
         self.finished: dict[str, Any] | None = None
@@ -48,15 +51,27 @@ class Child:
 
     def last_words(self) -> str:
         """Return the last line it wrote on stderr, "" when there is none."""
-        self._stderr.seek(0, os.SEEK_END)
-        self._stderr.seek(max(0, self._stderr.tell() - 4096))
-        lines = self._stderr.read().decode(errors="replace").strip().splitlines()
+        lines = self._words().decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else ""
 
-    def all_words(self) -> str:
-        """Return all it wrote on stderr."""
-        self._stderr.seek(0)
-        return self._stderr.read().decode(errors="replace")
+    def keep_words(self) -> str:
+        """Keep what it wrote on stderr (a traceback) in a file of its own; return the file's name."""
+        with tempfile.NamedTemporaryFile(prefix=f"push-{self.name}-", suffix=".txt", delete=False) as file:
+            file.write(self._words())
+        return file.name
+
+    def _words(self) -> bytes:
+        """Return the end of what it wrote on stderr; the file's position, which it shares with us, stays."""
+        size = os.fstat(self._stderr.fileno()).st_size
+        return os.pread(self._stderr.fileno(), MOST_WORDS, max(0, size - MOST_WORDS))
+
+    def how_it_ended(self) -> str:
+        """Return how the process ended, in words."""
+        code = self.process.returncode
+        if code is not None and code < 0:
+            return f"was killed by {signal.Signals(-code).name}"
+        words = self.last_words()
+        return f"ended with code {code}" + (f" ({words})" if words else "")
 
     def end(self, within_s: float) -> None:
         """Wait for its end, then kill it; always reaps."""
@@ -75,29 +90,27 @@ class Child:
         """Close our descriptors of it."""
         self.status.close()
         self._stderr.close()
-        if self.pidfd >= 0:
-            os.close(self.pidfd)
-            self.pidfd = -1
 
 
-def spawn(name: str, module: str, job: msgspec.Struct, fds: list[int], status: tuple[int, int]) -> Child:
-    """Start `python -m module` with `job` on stdin; it inherits `fds` and the write end of `status`.
+def spawn(name: str, module: str, job: msgspec.Struct, fds: list[int]) -> Child:
+    """Start `python -m module` with `job` on stdin; it inherits `fds`, and a pipe to report on as `job.status_fd`.
 
     It gets a session of its own, so that Ctrl-C in the terminal reaches the launcher only. The caller closes its
-    copies of `fds`; the write end of `status` is closed here.
+    copies of `fds`.
     """
+    listen_fd, status_fd = os.pipe()
     stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it
     process = subprocess.Popen(
         [sys.executable, "-m", module],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=stderr,
-        pass_fds=[*fds, status[1]],
+        pass_fds=[*fds, status_fd],
         start_new_session=True,
     )
-    os.close(status[1])
+    os.close(status_fd)
     assert process.stdin is not None
     with contextlib.suppress(BrokenPipeError):  # it died at once; its exit is seen soon enough
-        process.stdin.write(msgspec.json.encode(job))
+        process.stdin.write(msgspec.json.encode(replace(job, status_fd=status_fd)))
         process.stdin.close()
-    return Child(name, process, status[0], stderr)
+    return Child(name, process, listen_fd, stderr)

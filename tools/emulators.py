@@ -57,7 +57,7 @@ def open_ridgeback(
     loop: EventLoop, world: World, rig: RigConfig, host: str = "127.0.0.1", port: int = 0
 ) -> RosbridgeEmulator:
     """Open a rosbridge with a Ridgeback behind it; port 0 takes a free one."""
-    return RosbridgeEmulator(loop, world, port=0, settings=ridgeback_settings(rig))
+    return RosbridgeEmulator(loop, world, host=host, port=port, settings=ridgeback_settings(rig))
 
 
 OPENERS: dict[str, Callable[[EventLoop, World, RigConfig], Emulator]] = {

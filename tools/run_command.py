@@ -11,7 +11,7 @@ from typing import Any
 
 from robot_io.config import RigConfig
 from robot_io.error_report import say_json, tell
-from robot_io.errors import UsageError
+from robot_io.errors import PushError, UsageError
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools import run_dir, saved_tare, verdict
 from tools.live_line import LiveLine
@@ -22,6 +22,8 @@ from tools.saved_tare import SavedTare
 from tools.state_dir import RigLock
 
 REPORT_TIMEOUT_S = 60.0
+LARGEST_SEED = 2**63 - 1
+"""What the log can hold."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,6 +90,8 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
         )
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
+    if not 0 <= args.seed <= LARGEST_SEED:
+        raise UsageError(f"--seed {args.seed} is out of range", where="push run", do=f"Give 0 to {LARGEST_SEED}")
 
 
 def announce(rig: RigConfig) -> None:
@@ -124,15 +128,13 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Saved
     from tools.launcher import Launcher
 
     launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig))
-    figures = launcher.run()
+    try:
+        figures = launcher.run()
+    except PushError:
+        if not launcher.began:
+            run_dir.discard(out)
+        raise
     keep_tare(rig, figures)
-    recorded = launcher.recorded()
-    notes = []
-    if not recorded.get("complete", False):
-        notes.append("the log is not complete: `push log recover` may save it")
-    dropped = sum(recorded.get("dropped", {}).values())
-    if dropped:
-        notes.append(f"{dropped} records did not fit into the log's rings")
     return verdict.summary(
         rig,
         figures,
@@ -140,8 +142,8 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Saved
         log=launcher.log,
         seed=args.seed,
         level=level_of(rig),
-        devices=launcher.devices,
-        notes=notes,
+        devices=launcher.devices(figures),
+        notes=launcher.notes,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from pathlib import Path
@@ -30,6 +31,14 @@ def create(out: str | None, rig_name: str) -> Path:
             f"the run's folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
         ) from None
     return path
+
+
+def discard(path: Path) -> None:
+    """Remove the files of a run that never began, and the folder when nothing else is in it."""
+    for name in RUN_FILES:
+        (path / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        path.rmdir()
 
 
 def write_config(path: Path, rig: RigConfig) -> str:
