@@ -59,7 +59,13 @@ def frictionless_limit(body: PushedBody, k_f: float) -> float:
 
 
 def limit(bodies: Iterable[PushedBody], k_f: float) -> float:
-    """Return the greatest k_y (rad/m) that is stable for every body, whatever the contact friction."""
+    """Return the greatest k_y (rad/m) that is stable for every body, whatever the contact friction.
+
+    0 or less: none is; in particular for a k_f at which the force angle itself runs away (`fast_loop_k_f`).
+    """
+    bodies = tuple(bodies)
+    if k_f >= fast_loop_k_f(bodies):
+        return 0.0
     return min(min(sticking_limit(body, k_f), frictionless_limit(body, k_f)) for body in bodies)
 
 
