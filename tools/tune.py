@@ -183,7 +183,8 @@ def _tell(result: dict[str, Any], args: argparse.Namespace) -> None:
     best = result["recommended"]
     tell(
         f"recommended: k_f {best['k_f']:.3g}, k_y {best['k_y_rad_per_m']:.3g} rad/m, a margin of "
-        f"{result['margin']:.2g} to the limit {result['limit_k_y_rad_per_m']:.3g} rad/m over {result['assumed']} assumed sliders"
+        f"{result['margin']:.2g} to the limit {result['limit_k_y_rad_per_m']:.3g} rad/m over {result['assumed']} "
+        "assumed sliders"
     )
     tell(
         f"what it costs: {result['offset_m_per_degree']:.2g} m of steady offset for each degree of error in the "

@@ -37,7 +37,7 @@ def test_a_recommendation_with_its_margin_costs_and_map(tmp_path, capsys):
 def test_one_slider_gives_its_own_limit(tmp_path, capsys):
     _, result, _ = tune(
         capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "circle", "--size-m", "0.5,0.5",
-        "--pressures", "rim", "--turning", "along-push", "--push-height-m", "0.15", "--floor-friction", "0.3", "--anisotropy", "1.05",
+        "--pressures", "rim", "--turning", "along-push", "--floor-friction", "0.3", "--anisotropy", "1.05",
     )  # fmt: skip
     body = PushedBody(True, 0.25, 0.25 / 2**0.5, 0.05, 0.045, 1.05)
     assert result["assumed"] == 1
