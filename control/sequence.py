@@ -27,13 +27,20 @@ BACKWARD_RAD = math.pi / 2
 S = 1e-9
 
 
-def advance(settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float]) -> ControlState:
-    """Return the state after the phase logic of one tick; `contact` is the ball centre in the WORLD frame."""
+def advance(
+    settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float], held: bool
+) -> ControlState:
+    """Return the state after the phase logic of one tick.
+
+    contact: the ball centre in the WORLD frame. held: the supervisor held the base in the tick before.
+    """
     along = settings.path.along(*contact)
     progress = along - state.contact_from_m if state.contact_seen else 0.0
     state = replace(state, progress_m=progress, lateral_m=settings.path.lateral(*contact))
     state = _note_rest(state, inp)
     phase = Phase(state.phase)
+    if held and phase in (Phase.APPROACH, Phase.PUSH, Phase.LOST):
+        return _wait(settings, state, inp)
     if phase == Phase.SETTLE:
         return _settle(settings, state, inp, along)
     if phase == Phase.TARE:
@@ -57,6 +64,14 @@ def _enter(state: ControlState, phase: Phase, now_ns: int, **changes: object) ->
     return replace(state, phase=int(phase), phase_since_ns=now_ns, **changes)
 
 
+def _wait(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
+    """Stand still in time: no deadline of a phase runs while the base is held, and the speed ramps up afterwards."""
+    since = state.phase_since_ns + round(settings.period_s * (1 + inp.host.skipped) / S)
+    if state.phase == Phase.APPROACH:
+        since = inp.now_ns  # its ramp counts from there
+    return replace(state, phase_since_ns=since, ramp_since_ns=inp.now_ns, ramp_from_speed=0.0)
+
+
 def _note_rest(state: ControlState, inp: TickInput) -> ControlState:
     twist = inp.base.odometry
     rest = math.hypot(twist.vx, twist.vy) < REST_SPEED_M_PER_S and state.speed == 0.0
@@ -69,11 +84,12 @@ def _rested(state: ControlState, now_ns: int, for_ns: int) -> bool:
     return state.rest_since_ns > 0 and now_ns - max(state.rest_since_ns, state.phase_since_ns) >= for_ns
 
 
-def everyone_spoke(inp: TickInput) -> bool:
+def everyone_spoke(state: ControlState, inp: TickInput) -> bool:
     """Tell whether every device has given enough fresh data to start."""
     arm, base = inp.arm, inp.base
     return (
         inp.ft.packets_ok >= SETTLE_PACKETS
+        and inp.now_ns - state.last_reading_ns <= FRESH_NS
         and arm.link == LinkState.UP
         and arm.packets >= SETTLE_PACKETS
         and inp.now_ns - arm.published_ns <= FRESH_NS
@@ -86,7 +102,7 @@ def everyone_spoke(inp: TickInput) -> bool:
 
 
 def _settle(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
-    if not everyone_spoke(inp):
+    if not everyone_spoke(state, inp):
         return state
     held = replace(state, held_yaw=inp.base.pose.yaw, approach_from_m=along)
     if settings.in_contact:

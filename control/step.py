@@ -21,12 +21,12 @@ class Wanted(msgspec.Struct, frozen=True, gc=False):
     contact_y: float
 
 
-def step(settings: Settings, state: ControlState, inp: TickInput) -> tuple[ControlState, Wanted]:
-    """Return the state after this tick and the wanted velocity of the base."""
+def step(settings: Settings, state: ControlState, inp: TickInput, *, held: bool = False) -> tuple[ControlState, Wanted]:
+    """Return the state after this tick and the wanted velocity of the base; `held`: safety holds the base."""
     pose = inp.base.pose
     contact = contact_point_world(pose.x, pose.y, pose.yaw, settings.contact_x, settings.contact_y)
     state = sense(settings, state, inp.ft.readings, pose.yaw, inp.now_ns)
-    state = advance(settings, state, inp, contact)
+    state = advance(settings, state, inp, contact, held)
     if state.speed == 0.0:
         return state, Wanted(WorldTwist(), BodyTwist(), *contact)
     dx, dy = settings.path.direction_in_world(state.theta_p)

@@ -17,7 +17,10 @@ POSE_SLOW_FLOOR_NS, POSE_STOP_FLOOR_NS = 50_000_000, 120_000_000
 GATE_RECORD_STOP_NS = 100_000_000
 OVERSPEED_FACTOR = 1.3
 OVERSPEED_SAMPLES = 2
-IGNORE_M_PER_S = 0.05
+IGNORE_SHARE = 0.5
+"""Of the commanded speed: half of 0.1 m/s is the 0.05 m/s of the fault table ..."""
+IGNORE_LEAST_M_PER_S = 0.02
+"""... and no less than what odometry may be off at rest."""
 IGNORE_NS = 300_000_000
 MOVING_M_PER_S = 0.03
 MOVING_NS = 100_000_000
@@ -104,7 +107,8 @@ def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> 
         faults.append("F35")
     sent = base.sent
     off = math.hypot(twist.vx - sent.vx, twist.vy - sent.vy)
-    ignoring = off > IGNORE_M_PER_S and state.mode >= Mode.PUSHING and state.mode < Mode.STOP
+    ignored = max(IGNORE_SHARE * math.hypot(sent.vx, sent.vy), IGNORE_LEAST_M_PER_S)
+    ignoring = off > ignored and state.mode >= Mode.PUSHING and state.mode < Mode.STOP
     ignore_since = (state.ignore_since_ns or inp.now_ns) if ignoring else 0
     if ignore_since and inp.now_ns - ignore_since > IGNORE_NS:
         faults.append("F33")

@@ -22,10 +22,8 @@ def check(settings: SafetySettings, state: SafetyState, inp: TickInput) -> tuple
     if run >= LATE_SLOW_TICKS or host.skipped * settings.period_ns >= LATE_SLOW_NS:
         faults.append("F60-slow")
     gone_ns = 0 if host.recorder_alive else state.recorder_gone_ns or inp.now_ns
-    if gone_ns and inp.now_ns - gone_ns > RECORDER_GONE_NS:
+    if gone_ns and inp.now_ns - gone_ns >= RECORDER_GONE_NS:
         faults.append("F63")
-    if host.loop_error:
-        faults.append("F68")
     if inp.operator == Operator.STOP:
         faults.append("F64")
     return replace(state, late_run=run, recorder_gone_ns=gone_ns), faults

@@ -19,6 +19,11 @@ FROZEN_PACKETS = 30
 SATURATED = 0.95
 
 
+def note(state: SafetyState, inp: TickInput) -> SafetyState:
+    """Remember when the newest packet came, before anything is judged by it."""
+    return replace(state, last_ft_ns=inp.ft.readings[-1].received_ns) if inp.ft.readings else state
+
+
 def check(
     settings: SafetySettings, state: SafetyState, inp: TickInput, control: ControlState
 ) -> tuple[SafetyState, list[str]]:

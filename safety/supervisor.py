@@ -92,7 +92,7 @@ def _gather(
     if clamped:
         faults.append("F36")
     if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has not spoken is no fault
-        return state, faults
+        return sensor_checks.note(state, inp), faults
     for check in (sensor_checks.check, arm_checks.check, base_checks.check):
         state, found = check(settings, state, inp, control)
         faults += found

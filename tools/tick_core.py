@@ -8,7 +8,7 @@ from control.settings import Settings
 from control.step import step
 from robot_io.config import RigConfig
 from robot_io.messages import BodyTwist, WorldTwist
-from robot_io.tick import ControlTick, EnvelopeState, TickInput, TickOutput, TickState
+from robot_io.tick import ControlTick, EnvelopeState, Mode, TickInput, TickOutput, TickState
 from safety import envelope
 from safety.settings import SafetySettings
 from safety.supervisor import give_up, note_command, supervise
@@ -41,7 +41,7 @@ class TickCore(msgspec.Struct, frozen=True):
                 True,
                 verdict.exit_code,
             )
-        control, wanted = step(self.control, state.control, inp)
+        control, wanted = step(self.control, state.control, inp, held=state.safety.mode == Mode.HOLD)
         clamped = state.envelope.clamped
         safety, verdict = supervise(self.safety, state.safety, inp, control, wanted.body, clamped)
         new_envelope, command = envelope.apply(self.safety.envelope, state.envelope, wanted.body, verdict.mode)
