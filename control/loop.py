@@ -35,6 +35,8 @@ from robot_io.tick import (
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
+LOG_LOST = b"L"[0]
+"""The launcher says that the recorder cannot write any more: as good as gone."""
 MAX_READINGS = 64
 """More packets than this in one tick (half a second of them) are a flood; the oldest go."""
 
@@ -146,6 +148,9 @@ class ControlLoop:
             self._loop.remove_fd(self._operator_fd)
             typed = b"S"
         for key in typed:
+            if key == LOG_LOST:
+                self._watch.gone.add("recorder")
+                continue
             event = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
             if self._operator != Operator.STOP:
                 self._operator = event
