@@ -115,7 +115,7 @@ class Launcher:
                 self._live.say(f"gate: {event['text']}")
             elif child.name == "recorder" and event.get("event") == "error":
                 self._live.say(f"recorder: {event['what']}")
-                self._tell(b"L")
+                self._processes.tell_control(b"L")
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
 
