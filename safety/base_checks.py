@@ -50,7 +50,8 @@ def _of_link(settings: SafetySettings, inp: TickInput) -> list[str]:
         faults.append("F67")
     if inp.now_ns - base.published_ns > GATE_RECORD_STOP_NS:
         faults.append("F67-late")
-    silent_ns = inp.now_ns - base.newest_inbound_ns
+    # Odometry itself, not just anything: every judgement of motion below rests on it.
+    silent_ns = inp.now_ns - base.odometry_received_ns
     if silent_ns > STALE_STOP_NS:
         faults.append("F31-stop")
     elif silent_ns > STALE_HOLD_NS:
@@ -110,14 +111,14 @@ def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> 
     ignored = max(IGNORE_SHARE * math.hypot(sent.vx, sent.vy), IGNORE_LEAST_M_PER_S)
     ignoring = off > ignored and state.mode >= Mode.PUSHING and state.mode < Mode.STOP
     ignore_since = (state.ignore_since_ns or inp.now_ns) if ignoring else 0
-    if ignore_since and inp.now_ns - ignore_since > IGNORE_NS:
+    if ignore_since and inp.now_ns - ignore_since >= IGNORE_NS:
         faults.append("F33")
     zero_ns = inp.now_ns - state.zero_since_ns if state.zero_since_ns else 0
-    settled = zero_ns > STOPPING_NS + settings.envelope.speed / BASE_DECELERATION * 1e9
+    settled = zero_ns >= STOPPING_NS + settings.push_speed / BASE_DECELERATION * 1e9
     fresh = inp.now_ns - base.odometry_received_ns <= STALE_HOLD_NS  # an old speed says nothing of now
     moving = settled and fresh and speed > MOVING_M_PER_S and state.mode >= Mode.STOP
     moving_since = (state.moving_since_ns or inp.now_ns) if moving else 0
-    if moving_since and inp.now_ns - moving_since > MOVING_NS:
+    if moving_since and inp.now_ns - moving_since >= MOVING_NS:
         faults.append("F34")
     return replace(
         state,

@@ -29,7 +29,7 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     servo: bool
     max_heading_error: float
     pose_period_ns: int
-    expected_contact_m: float
+    push_speed: float
     envelope: EnvelopeLimits
 
     @classmethod
@@ -50,7 +50,7 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
             rig.arm.hold == "servo",
             math.radians(limits.max_heading_error_deg),
             round(1e9 / rig.base.pose_rate_hz),
-            rig.path.expected_contact_m,
+            rig.control.push_speed_m_per_s,
             EnvelopeLimits(
                 speed_limit_m_per_s(rig),
                 MAX_TURN_RATE_RAD_PER_S,

@@ -51,7 +51,7 @@ def supervise(
     """
     state, faults = _gather(settings, state, inp, control, wanted, clamped)
     faults = _after_pause(state, inp, faults)
-    state = replace(state, grace_ticks=2 if inp.host.skipped else max(state.grace_ticks - 1, 0))
+    state = replace(state, grace_ticks=1 if _pause(state, inp) else 0)
     new = tuple(i for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in state.latched)
     latched = state.latched + new
     asked = max(strongest(tuple(faults)), strongest(latched))
@@ -64,10 +64,11 @@ def supervise(
 
 
 def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
-    """Return the verdict on a tick whose checks themselves failed (an exception in the loop): dead, at once."""
+    """Return the verdict on a tick whose checks themselves failed (an exception in the loop): over, at once."""
     latched = tuple(dict.fromkeys([*state.latched, "F68"]))
-    state = replace(state, mode=int(Mode.DEAD), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
-    return state, Verdict(Mode.DEAD, latched, True, FAULTS["F68"].exit_code)
+    mode = max(Mode(state.mode), FAULTS["F68"].mode)
+    state = replace(state, mode=int(mode), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
+    return state, Verdict(mode, latched, True, FAULTS["F68"].exit_code)
 
 
 def note_command(state: SafetyState, command: BodyTwist, now_ns: int) -> SafetyState:
@@ -99,18 +100,26 @@ def _gather(
     return state, faults
 
 
+def _pause(state: SafetyState, inp: TickInput) -> bool:
+    """Tell whether ticks were skipped just now; a loop that skips tick after tick has no pause to excuse it."""
+    return inp.host.skipped > 0 and state.late_run == 1
+
+
 def _after_pause(state: SafetyState, inp: TickInput, faults: list[str]) -> list[str]:
-    """After skipped ticks: no staleness in this tick, and at most HOLD in the next."""
-    if inp.host.skipped:
+    """After a pause: no staleness in this tick, and at most HOLD in the next."""
+    if _pause(state, inp):
         return [i for i in faults if not i.startswith(STALENESS)]
     if state.grace_ticks:
-        return [_at_most_hold(i) if i.startswith(STALENESS) else i for i in faults]
+        return [softer for i in faults if (softer := _at_most_hold(i) if i.startswith(STALENESS) else i)]
     return faults
 
 
 def _at_most_hold(fault: str) -> str:
-    softer = fault.split("-")[0] + "-hold"
-    return softer if FAULTS[fault].mode > Mode.HOLD and softer in FAULTS else fault
+    """Return the row itself, the softer row of the same device, or "" where there is none."""
+    if FAULTS[fault].mode <= Mode.HOLD:
+        return fault
+    device = fault.split("-")[0]
+    return next((row for row in (f"{device}-hold", f"{device}-slow") if row in FAULTS), "")
 
 
 def _next_mode(state: SafetyState, asked: Mode, control: ControlState, now_ns: int) -> tuple[Mode, SafetyState]:
@@ -139,7 +148,8 @@ def _working_mode(control: ControlState) -> Mode:
 def _ending(state: SafetyState, inp: TickInput, control: ControlState) -> tuple[bool, int]:
     """Return whether the run is over, and its exit code."""
     if state.mode >= Mode.STOP:
-        code = next((FAULTS[i].exit_code for i in state.latched if FAULTS[i].mode >= Mode.STOP), 5)
+        # The strongest cause names the end, the first of equals: a stop key is no clean end when the base rolled on.
+        code = FAULTS[max(state.latched, key=lambda i: FAULTS[i].mode)].exit_code
         zero_ns = inp.now_ns - state.stop_since_ns
         twist = inp.base.odometry
         # An unknown (NaN) speed compares false: it is not taken for rest.

@@ -8,14 +8,8 @@ from msgspec.structs import replace
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ControlState, Mode, Operator, Phase, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing
+from tests.safety.fold_bench import without_contact as no_force
 from tools.tick_core import TickCore
-
-
-def no_force(inp, _=0):
-    """Return the input with a sensor that feels nothing but its bias."""
-    scatter = (inp.tick * 7 % 11 - 5) * 0.01
-    readings = tuple(replace(r, force=tuple(b + scatter for b in BIAS[:3])) for r in inp.ft.readings)
-    return replace(inp, ft=replace(inp.ft, readings=readings))
 
 
 def resume(inp, _=0):
@@ -349,7 +343,8 @@ def test_an_old_force_is_no_force():
     silent = lambda inp, _: replace(inp, ft=replace(inp.ft, readings=()))  # noqa: E731
     ticks = bench.run_until(lambda b: not b.state.control.force_valid, silent)
     assert ticks == 10
-    assert bench.state.control.phase == Phase.LOST
+    assert bench.output.mode == Mode.HOLD  # after 80 ms without a packet; the sequence waits meanwhile
+    assert bench.state.control.phase == Phase.PUSH
     assert bench.state.control.force_world[0] > 14.0
 
 

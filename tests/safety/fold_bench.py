@@ -52,14 +52,17 @@ class FoldBench:
     def good_input(self) -> TickInput:
         """Return what the core sees when all is well."""
         count = self.tick + 1
-        joints = JointState(self.rig.arm.held_pose_rad, (0.0,) * 6, 7, 1, 1, 1, 1, 1.0, self.tick * 0.01)
+        servo = self.rig.arm.hold == "servo"  # then our own program plays on the arm
+        joints = JointState(
+            self.rig.arm.held_pose_rad, (0.0,) * 6, 7, 1, 1, 1, 2 if servo else 1, 1.0, self.tick * 0.01
+        )
         return TickInput(
             self.tick,
             self.now_ns,
             0,
             HostInput(0, 0, True, True, True, False, 0),
             FtInput((self._reading(),), LINK_UP, count, 0, 0),
-            ArmRecord(joints, (253,) * 6, count, self.now_ns, self.now_ns, LINK_UP),
+            ArmRecord(joints, (253,) * 6, count, self.now_ns, self.now_ns, LINK_UP, 0, servo),
             BaseRecord(
                 pose=self.pose,
                 pose_valid=True,
@@ -136,6 +139,12 @@ class FoldBench:
         scatter = (self.tick * 7 % 11 - 5) * 0.01
         force = tuple(round(sum(rows[r][c] * reaction[r] for r in range(3)) + BIAS[c] + scatter, 2) for c in range(3))
         return FtReading(self.now_ns, self.tick + 1, force, tuple(b + scatter * 0.1 for b in BIAS[3:]))
+
+
+def without_contact(inp: TickInput, _since: int = 0) -> TickInput:
+    """Return the input with a sensor that feels nothing but its bias."""
+    scatter = (inp.tick * 7 % 11 - 5) * 0.01
+    return with_force(inp, tuple(b + scatter for b in BIAS[:3]))
 
 
 def with_force(inp: TickInput, force: tuple[float, float, float]) -> TickInput:

@@ -1,0 +1,279 @@
+"""One way (or more) to bring about each row of the fault table, by bad input to the folded core."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from msgspec.structs import replace
+
+from robot_io.messages import BaseStatus, BodyTwist, Pose2D
+from robot_io.tick import Operator, Phase, TickInput
+from tests.safety.fold_bench import BIAS, PERIOD_NS, Alter, FoldBench, pushing, with_force, without_contact
+
+UNFILTERED = ("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0")
+BY_THE_GATE = {
+    "F65": "control is dead: the gate says it (tests of the gate)",
+    "F66": "control is silent: the gate says it (tests of the gate)",
+}
+"""Rows that no tick of control can raise, each with its reason."""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """`alter` makes the bad input; the ticks are counted after `warm` ticks of it. `also`: faults that may come too."""
+
+    row: str
+    what: str
+    alter: Alter
+    start: Callable[[], FoldBench] = pushing
+    warm: int = 0
+    also: frozenset[str] = field(default_factory=frozenset)
+    before: Callable[[FoldBench], None] = lambda bench: None
+    """Done before each altered tick (to let time pass)."""
+
+    def __str__(self) -> str:
+        return f"{self.row} {self.what}"
+
+
+def ft(**changes) -> Alter:
+    return lambda inp, _: replace(inp, ft=replace(inp.ft, **changes))
+
+
+def reading(**changes) -> Alter:
+    return lambda inp, _: replace(
+        inp, ft=replace(inp.ft, readings=tuple(replace(r, **changes) for r in inp.ft.readings))
+    )
+
+
+def arm(**changes) -> Alter:
+    return lambda inp, _: replace(inp, arm=replace(inp.arm, **changes))
+
+
+def joints(**changes) -> Alter:
+    return lambda inp, _: replace(inp, arm=replace(inp.arm, joints=replace(inp.arm.joints, **changes)))
+
+
+def base(**changes) -> Alter:
+    return lambda inp, _: replace(inp, base=replace(inp.base, **changes))
+
+
+def host(**changes) -> Alter:
+    return lambda inp, _: replace(inp, host=replace(inp.host, **changes))
+
+
+def old(table: str, *keys: str) -> Alter:
+    """Make the last of something be what came just in the tick before the first one without it."""
+
+    def alter(inp: TickInput, n: int) -> TickInput:
+        at = dict.fromkeys(keys, inp.now_ns - (n + 1) * PERIOD_NS)
+        return replace(inp, **{table: replace(getattr(inp, table), **at)})
+
+    return alter
+
+
+def moved_joint(by: float, axis: int = 2) -> Alter:
+    def alter(inp: TickInput, _: int) -> TickInput:
+        position = tuple(q + (by if i == axis else 0.0) for i, q in enumerate(inp.arm.joints.position))
+        return replace(inp, arm=replace(inp.arm, joints=replace(inp.arm.joints, position=position)))
+
+    return alter
+
+
+def shifted_pose(x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Alter:
+    def alter(inp: TickInput, _: int) -> TickInput:
+        pose = inp.base.pose
+        return replace(inp, base=replace(inp.base, pose=Pose2D(pose.x + x, pose.y + y, pose.yaw + yaw)))
+
+    return alter
+
+
+def pressed(newton: float) -> Alter:
+    """Press straight on the ball: minus along the sensor's Z."""
+    return lambda inp, _: with_force(inp, (BIAS[0], BIAS[1], BIAS[2] - newton))
+
+
+def then(*alters: Alter) -> Alter:
+    def alter(inp: TickInput, n: int) -> TickInput:
+        for one in alters:
+            inp = one(inp, n)
+        return inp
+
+    return alter
+
+
+def operator(what: Operator) -> Alter:
+    return lambda inp, _: replace(inp, operator=int(what))
+
+
+def taring() -> FoldBench:
+    bench = FoldBench().run_to(Phase.TARE)
+    for _ in range(5):
+        bench.fold()
+    return bench
+
+
+def approaching(*overrides: str) -> FoldBench:
+    bench = FoldBench(overrides).run_to(Phase.APPROACH)
+    for _ in range(70):
+        bench.fold()
+    return bench
+
+
+def approaching_at_full_speed() -> FoldBench:
+    """Return a bench on a long approach, at its 0.05 m/s."""
+    bench = FoldBench().run_to(Phase.APPROACH)
+    for n in range(150):
+        bench.fold(without_contact, n)
+    return bench
+
+
+def approaching_in_vain() -> FoldBench:
+    """Return a bench whose next tick sees the ball more than 0.5 m beyond the expected contact."""
+    bench = FoldBench().run_to(Phase.APPROACH)
+    while bench.pose.x + 1.0 - bench.state.control.approach_from_m <= 0.55:
+        bench.fold(without_contact)
+    return bench
+
+
+def checking() -> FoldBench:
+    bench = pushing()
+    bench.run_until(lambda b: b.state.control.phase == Phase.RETREAT)
+    return bench
+
+
+def pushing_sideways() -> FoldBench:
+    """Return a bench whose force points 75 degrees off from the next tick on: 97.5 degrees wanted."""
+    bench = pushing(UNFILTERED)
+    bench.force_path = (15.0 * math.cos(math.radians(75)), 15.0 * math.sin(math.radians(75)))
+    return bench
+
+
+def shaking(inp: TickInput, n: int) -> TickInput:
+    one = inp.ft.readings[0]
+    return with_force(inp, (one.force[0] + 5.0 * (-1) ** n, one.force[1], one.force[2]))
+
+
+def alternate_torque(inp: TickInput, n: int) -> TickInput:
+    return reading(torque=(21.0 + BIAS[3], BIAS[4] + 0.001 * n, BIAS[5]))(inp, n)
+
+
+NAN = math.nan
+SERVO = ('arm.hold="servo"',)
+BUSY = {
+    "robot mode": joints(robot_mode=3),
+    "power off": joints(robot_status_bits=0),
+    "teach button": joints(robot_status_bits=0b101),
+    "one joint off": arm(joint_modes=(253, 253, 239, 253, 253, 253)),
+}
+SCENARIOS = [
+    # --- start
+    Scenario("R01", "no arm", arm(packets=3), FoldBench, warm=500),
+    Scenario("R02", "somebody shakes the tool", shaking, lambda: FoldBench().run_to(Phase.TARE), warm=99),
+    Scenario(
+        "R03", "something hangs on the tool", reading(force=(0.0, 0.0, 151.0)),
+        lambda: FoldBench(("ft.noise_force_N=0", "ft.noise_torque_Nm=0")).run_to(Phase.TARE), warm=99,
+        also=frozenset({"R02"}),
+    ),
+    Scenario("R04", "arm elsewhere", moved_joint(0.051), FoldBench, warm=19),
+    # --- force-torque sensor
+    Scenario("F01-slow", "silent", ft(readings=())),
+    Scenario("F01-hold", "silent", ft(readings=())),
+    Scenario("F01-stop", "silent", ft(readings=()), also=frozenset({"F52"})),
+    Scenario("F02", "unplugged", ft(link=3)),
+    Scenario("F06", "frozen", reading(force=(BIAS[0], BIAS[1], BIAS[2] - 15.0), torque=BIAS[3:])),
+    *(
+        Scenario("F07", f"force axis {i}, {sign:+.0f}", reading(force=tuple(sign * 285.0 * (i == k) for k in range(3))),
+                 taring)
+        for i in range(3) for sign in (1.0, -1.0)
+    ),
+    *(
+        Scenario("F07", f"torque axis {i}, {sign:+.0f}",
+                 reading(torque=tuple(sign * 28.5 * (i == k) for k in range(3))), taring)
+        for i in range(3) for sign in (1.0, -1.0)
+    ),
+    Scenario("F07", "while pushing", pressed(340.0), also=frozenset({"F50-stop"})),
+    Scenario("F09", "drifted", lambda inp, _: with_force(inp, (BIAS[0] + 6.0, BIAS[1], BIAS[2])), checking,
+             also=frozenset({"F06"})),
+    Scenario("F10", "NaN", reading(force=(NAN, 0.0, 0.0)), also=frozenset({"F52"})),
+    Scenario("F10", "infinite", reading(force=(0.0, -math.inf, 0.0)), also=frozenset({"F52"})),
+    Scenario("F10", "torque NaN", reading(torque=(0.0, 0.0, NAN))),
+    Scenario("F10", "NaN while taring", reading(force=(0.0, 0.0, NAN)), taring),
+    # --- arm
+    *(Scenario("F20-hold", f"joint {i}", moved_joint(0.006 * (-1) ** i, i)) for i in range(6)),
+    Scenario("F20-stop", "drift", moved_joint(-0.0101)),
+    Scenario("F20-stop", "no longer held actively", arm(servo=False), lambda: pushing(SERVO)),
+    Scenario("F21", "joint moves", joints(velocity=(0.0, 0.0, 0.0, -0.021, 0.0, 0.0))),
+    *(Scenario("F22", f"safety bit {bit}", joints(safety_bits=1 | 1 << bit)) for bit in (2, 3, 4, 8, 9, 10)),
+    Scenario("F22", "neither normal nor reduced", joints(safety_bits=0)),
+    *(Scenario("F23", f"safety bit {bit}", joints(safety_bits=1 | 1 << bit)) for bit in (5, 6, 7)),
+    Scenario("F24-hold", "no record", old("arm", "published_ns", "changed_ns")),
+    Scenario("F24-stop", "no record", old("arm", "published_ns", "changed_ns")),
+    Scenario("F24-stop", "link lost", arm(link=3)),
+    Scenario("F25-hold", "frozen", old("arm", "changed_ns")),
+    Scenario("F25-stop", "frozen", old("arm", "changed_ns")),
+    *(Scenario("F27", what, alter) for what, alter in BUSY.items()),
+    Scenario("F28", "a program plays", joints(runtime_state=2)),
+    Scenario("F28", "a program pauses", joints(runtime_state=4)),
+    Scenario("F29", "NaN position", joints(position=(0.0, NAN, 0.0, 0.0, 0.0, 0.0))),
+    Scenario("F29", "infinite velocity", joints(velocity=(0.0, 0.0, 0.0, 0.0, 0.0, math.inf))),
+    Scenario("F69", "process gone", host(arm_alive=False)),
+    # --- base, localisation, gate
+    Scenario("F30", "reset", base(latched=True, latch_cause=11)),
+    Scenario("F31-hold", "no odometry", old("base", "odometry_received_ns")),
+    Scenario("F31-stop", "no odometry", old("base", "odometry_received_ns")),
+    Scenario(
+        "F31-hold", "half-open", old("base", "odometry_received_ns", "pose_received_ns", "newest_inbound_ns"),
+        also=frozenset({"F40-slow"}),
+    ),
+    Scenario("F33", "stands", base(odometry=BodyTwist())),
+    Scenario("F33", "goes elsewhere", base(odometry=BodyTwist(0.1, 0.06, 0.0))),
+    Scenario("F33", "stands while approaching", base(odometry=BodyTwist()), approaching_at_full_speed),
+    Scenario(
+        "F34", "rolls on", then(operator(Operator.STOP), base(odometry=BodyTwist(0.1, 0.0, 0.0))),
+        also=frozenset({"F64"}),
+    ),
+    Scenario("F35", "too fast", base(odometry=BodyTwist(0.14, 0.14, 0.0))),
+    Scenario("F35", "turns too fast", base(odometry=BodyTwist(0.1, 0.0, -0.33))),
+    Scenario("F35", "NaN", base(odometry=BodyTwist(NAN, 0.0, 0.0))),
+    Scenario("F36", "approach beyond the envelope", without_contact,
+             lambda: approaching("control.approach_speed_m_per_s=0.2")),
+    Scenario("F38", "stop pressed", base(status=BaseStatus(True, True, 26.0))),
+    Scenario("F38", "motors off", base(status=BaseStatus(False, False, 26.0))),
+    Scenario("F40-slow", "silent", old("base", "pose_received_ns")),
+    Scenario("F40-stop", "silent", old("base", "pose_received_ns")),
+    Scenario("F41", "away", shifted_pose(x=0.5)),
+    Scenario("F41", "aside", shifted_pose(y=-0.5)),
+    Scenario("F41", "turned", shifted_pose(yaw=0.06)),
+    Scenario("F42", "not valid", base(pose_valid=False)),
+    *(
+        Scenario("F42", f"NaN {key}", base(pose=replace(Pose2D(), **{key: NAN})), also=frozenset({"F58", "F52"}))
+        for key in ("x", "y", "yaw")
+    ),
+    Scenario("F44", "turned left", shifted_pose(yaw=0.088)),
+    Scenario("F44", "turned right", shifted_pose(yaw=-0.088)),
+    Scenario("F67", "latched", base(latched=True, latch_cause=1)),
+    Scenario("F67", "gone", host(gate_alive=False)),
+    Scenario("F67-late", "frozen", old("base", "published_ns")),
+    # --- force and task
+    Scenario("F50-slow", "pressed", pressed(101.0)),
+    Scenario("F50-stop", "pressed", pressed(151.0)),
+    Scenario("F50-stop", "from above", lambda inp, _: with_force(inp, (BIAS[0] + 151.0, BIAS[1], BIAS[2])),
+             also=frozenset()),
+    Scenario("F51", "twisted", alternate_torque),
+    Scenario("F52", "no force", without_contact, lambda: pushing(UNFILTERED)),
+    Scenario("F52-hold", "no force", without_contact, lambda: pushing(UNFILTERED), warm=300,
+             also=frozenset({"F52"})),
+    Scenario("F53", "nothing there", without_contact, approaching_in_vain),
+    Scenario("F56", "backward", lambda inp, _: inp, pushing_sideways),
+    Scenario("F58", "no number", base(pose=Pose2D(0.0, 0.0, NAN)), also=frozenset({"F42", "F52"})),
+    # --- host
+    Scenario("F60-late", "one tick skipped", host(skipped=1), before=lambda b: b.skip(1)),
+    Scenario("F60-slow", "30 ms", host(skipped=3), before=lambda b: b.skip(3), also=frozenset({"F60-late"})),
+    Scenario("F60-slow", "three in a row", host(skipped=1), before=lambda b: b.skip(1),
+             also=frozenset({"F60-late"})),
+    Scenario("F63", "gone", host(recorder_alive=False)),
+    Scenario("F64", "stop key", operator(Operator.STOP)),
+    Scenario("F68", "exception", host(loop_error=True)),
+]  # fmt: skip

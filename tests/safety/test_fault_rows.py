@@ -1,0 +1,193 @@
+"""Every row of the fault table: noticed in time, reacted to as it says, cleared only as it says; no row untested."""
+
+import ast
+import math
+
+import pytest
+from msgspec.structs import replace
+
+import tools.tick_core
+from robot_io.messages import BodyTwist
+from robot_io.tick import ControlState, Mode
+from safety import arm_checks, base_checks, host_checks, sensor_checks, supervisor, task_checks
+from safety.faults import FAULTS, Clears, strongest
+from tests.mutants import load, tree_of
+from tests.safety.fault_scenarios import BY_THE_GATE, SCENARIOS, Scenario
+from tests.safety.fold_bench import FoldBench
+
+ids = [str(s) for s in SCENARIOS]
+
+
+def size(twist: BodyTwist) -> float:
+    return math.hypot(twist.vx, twist.vy)
+
+
+def ticks_to(scenario: Scenario, most: int) -> tuple[FoldBench, int | None, float]:
+    """Return the bench at the first tick that names the row, how many ticks that took, and the speed before."""
+    bench = scenario.start()
+    n = 0
+    for n in range(scenario.warm):
+        scenario.before(bench)
+        bench.fold(scenario.alter, n)
+        assert scenario.row not in bench.output.faults, f"already after {n} ticks"
+    speed = size(bench.output.command_body) if bench.output else 0.0
+    for n in range(most + 1):
+        scenario.before(bench)
+        bench.fold(scenario.alter, scenario.warm + n)
+        if scenario.row in bench.output.faults:
+            return bench, n, speed
+    return bench, None, speed
+
+
+def family(row: str) -> str:
+    return row.partition("-")[0]
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=ids)
+def test_the_row_is_noticed_in_time_and_reacted_to(scenario):
+    row = FAULTS[scenario.row]
+    patience = row.bound_ticks if row.mode != Mode.SILENT else 300  # a warning has no bound
+    bench, ticks, speed = ticks_to(scenario, patience)
+    assert ticks is not None, f"not noticed within {patience} ticks: {bench.output.faults}"
+    others = {f for f in bench.output.faults if family(f) != family(scenario.row)} - scenario.also
+    assert not others
+    command = bench.output.command_body
+    if row.mode == Mode.SILENT:
+        assert bench.output.mode <= Mode.PUSHING
+        assert size(command) == pytest.approx(speed, abs=0.011)
+    else:
+        assert bench.output.mode >= row.mode
+    if row.mode >= Mode.STOP:
+        assert command == BodyTwist()
+    elif row.mode >= Mode.SLOW:
+        assert size(command) < speed or command == BodyTwist()
+
+
+@pytest.mark.parametrize("scenario", [s for s in SCENARIOS if FAULTS[s.row].clears == Clears.LATCHED], ids=str)
+def test_a_latched_row_ends_the_run_although_all_is_well_again(scenario):
+    row = FAULTS[scenario.row]
+    bench, _, _ = ticks_to(scenario, 300)
+    bench.odometry = BodyTwist()  # the base stands in the end
+    last = size(bench.output.command_body)
+    for _ in range(300):
+        if bench.output.finished:
+            break
+        bench.fold()
+        assert scenario.row in bench.output.faults
+        assert bench.output.mode >= row.mode
+        assert size(bench.output.command_body) <= last
+        last = size(bench.output.command_body)
+    assert bench.output.finished
+    assert bench.output.command_body == BodyTwist()
+    assert bench.output.exit_code == row.exit_code
+
+
+CLEARING = [
+    s for s in SCENARIOS if FAULTS[s.row].clears == Clears.AUTO and FAULTS[s.row].mode in (Mode.SLOW, Mode.HOLD)
+]
+
+
+@pytest.mark.parametrize("scenario", [s for s in CLEARING if not s.row.startswith(("F52", "F53"))], ids=str)
+def test_a_passing_row_clears_after_one_clean_second_one_mode_a_tick(scenario):
+    row = FAULTS[scenario.row]
+    bench, _, speed = ticks_to(scenario, 300)
+    modes = [Mode(bench.output.mode)]
+    for _ in range(240):  # the clean second, and a second to ramp up again
+        bench.fold()
+        modes.append(Mode(bench.output.mode))
+    assert bench.output.faults == ()
+    assert modes[0] == row.mode
+    assert modes[1 : 1 + 100] == [row.mode] * 100  # a whole clean second
+    assert modes[-1] == Mode.PUSHING
+    after = [m for m in modes if m < row.mode]
+    assert [modes[101 + i] for i in range(row.mode - Mode.PUSHING)] == [
+        Mode(row.mode - 1 - i) for i in range(row.mode - Mode.PUSHING)
+    ]
+    assert after
+    assert size(bench.output.command_body) == pytest.approx(speed, abs=1e-3)
+
+
+def test_every_row_has_a_scenario_or_a_reason():
+    assert set(FAULTS) == {s.row for s in SCENARIOS} | set(BY_THE_GATE)
+    assert not {s.row for s in SCENARIOS} & set(BY_THE_GATE)
+
+
+def test_the_table_says_what_it_means():
+    for key, row in FAULTS.items():
+        assert key == row.id
+        assert (row.mode == Mode.SILENT) == (row.bound_ticks == 0 and key != "F68")
+        assert row.exit_code in (1, 4, 5, 6, 130)
+        if row.mode >= Mode.STOP:
+            assert row.clears == Clears.LATCHED
+    assert strongest(()) == Mode.SILENT
+    assert strongest(("F50-slow", "F23", "F64")) == Mode.DEAD
+
+
+# --- the test of the tests: without its check, a row goes unnoticed -----------------------------------------------
+
+CHECKS = {
+    "safety.sensor_checks": sensor_checks,
+    "safety.arm_checks": arm_checks,
+    "safety.base_checks": base_checks,
+    "safety.host_checks": host_checks,
+    "safety.task_checks": task_checks,
+    "safety.supervisor": supervisor,
+}
+
+
+def naming(tree: ast.Module, row: str) -> list[ast.If]:
+    """Return each `if` whose own body (not that of an `if` inside it) names the row."""
+
+    def names(node: ast.AST) -> bool:
+        if isinstance(node, ast.Constant) and node.value == row:
+            return True
+        if isinstance(node, ast.Name) and node.id == "_REFUSALS" and row in ("R02", "R03"):
+            return True
+        return any(names(child) for child in ast.iter_child_nodes(node) if not isinstance(child, ast.If))
+
+    found = []
+    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
+        found += [n for n in ast.walk(function) if isinstance(n, ast.If) and any(names(child) for child in n.body)]
+    return found
+
+
+PLACES = [
+    (row, module, index) for row in FAULTS for module in CHECKS for index in range(len(naming(tree_of(module), row)))
+]
+
+
+def without_check(row: str, module: str, index: int):
+    tree = tree_of(module)
+    naming(tree, row)[index].test = ast.Constant(False)
+    return load(module, tree)
+
+
+@pytest.mark.parametrize(("row", "module", "index"), PLACES, ids=[f"{r} in {m} {i}" for r, m, i in PLACES])
+def test_without_its_check_a_row_goes_unnoticed(row, module, index, monkeypatch):
+    blind = without_check(row, module, index)
+    if module == "safety.supervisor":
+        monkeypatch.setattr(tools.tick_core, "supervise", blind.supervise)
+    else:
+        monkeypatch.setattr(CHECKS[module], "check", blind.check)
+    scenarios = [s for s in SCENARIOS if s.row == row]
+    missed = []
+    for scenario in scenarios:
+        try:
+            missed.append(ticks_to(scenario, max(FAULTS[row].bound_ticks, 40))[1] is None)
+        except AssertionError:  # a scenario that can no longer even begin
+            missed.append(True)
+    assert any(missed)
+
+
+def test_every_row_has_a_check_to_remove():
+    by_give_up = {"F68"}  # raised by the fold itself, see the tests of the supervisor
+    rows = {row for row, _, _ in PLACES}
+    assert set(FAULTS) - rows - set(BY_THE_GATE) - by_give_up == set()
+
+
+def test_a_wanted_velocity_that_is_no_number_is_a_fault_by_itself():
+    inp = FoldBench().good_input()
+    for bad in (BodyTwist(math.nan, 0.0, 0.0), BodyTwist(0.0, math.inf, 0.0), BodyTwist(0.0, 0.0, -math.inf)):
+        assert task_checks.check(inp, ControlState(phase=3), bad, inp.now_ns) == ["F58"]
+    assert task_checks.check(inp, ControlState(phase=3), BodyTwist(), inp.now_ns) == []
+    assert task_checks.check(replace(inp, tick=1), ControlState(phase=9), BodyTwist(), inp.now_ns) == []
