@@ -170,6 +170,21 @@ class SliderConfig(Table, frozen=True):
     """`uniform` by the integral in the paper, `rim` at the greatest distance, `point` a tenth of uniform."""
 
 
+class FloorConfig(Table, frozen=True):
+    """What the floor of the simulated world does beyond an even ellipsoid of friction; nothing by default."""
+
+    push_height_m: Annotated[float, Meta(ge=0, le=2)] = 0.0
+    """Height of the push above the floor: moves the pressure ahead, by this times the floor's friction."""
+    turning: Literal["ellipsoid", "along-push"] = "ellipsoid"
+    """What resists turning: the greatest torque, or (right while sliding straight) the pressure along the push."""
+    along_over_across: Annotated[float, Meta(ge=0.5, le=2)] = 1.0
+    """Friction along the path over friction across it."""
+    patch_strength: Annotated[float, Meta(ge=0, le=0.9)] = 0.0
+    """How much the friction varies from place to place, relative to its mean; each seed is another floor."""
+    patch_m: Annotated[float, Meta(ge=0.01, le=10)] = 0.3
+    """About how large a patch is."""
+
+
 class StartConfig(Table, frozen=True):
     """Where things stand in the simulated world before the approach, relative to the path."""
 
@@ -206,6 +221,7 @@ class WorldConfig(Table, frozen=True):
     ball_radius_m: Annotated[float, Meta(ge=0.001, le=0.2)] = 0.05
     """Radius of the contact ball."""
     slider: SliderConfig = SliderConfig()
+    floor: FloorConfig = FloorConfig()
     start: StartConfig = StartConfig()
     sensor: SensorModelConfig = SensorModelConfig()
     arm_rate_hz: Annotated[float, Meta(ge=20, le=125.5)] = 124.99

@@ -7,8 +7,9 @@ import random
 
 import msgspec
 
-from robot_io.config import RigConfig, SliderConfig
+from robot_io.config import FloorConfig, RigConfig, SliderConfig
 from robot_io.messages import Pose2D
+from sim_backend.floor import Floor, FloorEffects
 from sim_backend.shapes import Circle, Rectangle
 from sim_backend.slider import SliderModel
 
@@ -34,6 +35,23 @@ def slider_model(config: SliderConfig) -> SliderModel:
         contact_friction=config.contact_friction,
         pressure=config.pressure,
     )
+
+
+def floor_of(rig: RigConfig, seed: int) -> Floor | None:
+    """Return what the rig's floor does beyond the slider's ellipsoid, None for nothing. Raises ConfigError."""
+    config = rig.world.floor
+    if config == FloorConfig():
+        return None
+    effects = FloorEffects(
+        shift_m=rig.world.slider.floor_friction * config.push_height_m,
+        turning=config.turning,
+        along_over_across=config.along_over_across,
+        grain_rad=math.radians(rig.path.direction_deg),
+        patch_strength=config.patch_strength,
+        patch_m=config.patch_m,
+        seed=seed,
+    )
+    return Floor(slider_model(rig.world.slider), rig.world.slider.pressure, effects)
 
 
 def place(rig: RigConfig, seed: int) -> Scene:

@@ -16,7 +16,7 @@ from robot_io.world_messages import WorldCommand, WorldStall, WorldStart, WorldS
 from sim_backend.base_plant import GRID_NS, BasePlant
 from sim_backend.contact import FREE, PushedSlider
 from sim_backend.plant import ArmTruth, BaseTruth
-from sim_backend.scene import place, slider_model
+from sim_backend.scene import floor_of, place, slider_model
 from sim_backend.sensor_model import SensorModel
 
 STATE_EVERY_STEPS = 10
@@ -49,6 +49,7 @@ class World:
             (scene.slider.x, scene.slider.y, scene.slider.yaw),
             rig.world.ball_radius_m,
             rig.world.solver,
+            floor_of(rig, seed),
         )
         self._sensor = SensorModel(rig, seed)
         self._arm = ArmTruth(rig.arm.held_pose_rad, (0.0,) * 6)

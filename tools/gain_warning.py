@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from robot_io.config import RigConfig
 from sim_backend.gain_limits import WARN_SHARE, PushedBody, limit
-from sim_backend.scene import slider_model
+from sim_backend.scene import floor_of, slider_model
 
 
 def gain_warning(rig: RigConfig) -> str | None:
@@ -13,11 +15,16 @@ def gain_warning(rig: RigConfig) -> str | None:
     if control.controller != "force":
         return None
     is_round = slider.shape == "circle"
+    even = replace(rig, world=replace(rig.world, floor=replace(rig.world.floor, patch_strength=0.0)))
+    floor = floor_of(even, seed=0)
+    d = slider_model(slider).d_m if floor is None else floor.grip(0.0, 0.0, 1.0, 0.0, 1.0, 0.0)[2]
     body = PushedBody(
         is_round,
         slider.radius_m if is_round else slider.length_m / 2,
-        slider_model(slider).d_m,
+        d,
         rig.world.ball_radius_m,
+        slider.floor_friction * rig.world.floor.push_height_m,
+        rig.world.floor.along_over_across,
     )
     highest = limit([body], control.k_f)
     if control.k_y_rad_per_m <= WARN_SHARE * highest:

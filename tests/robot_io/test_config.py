@@ -23,6 +23,8 @@ DIMENSIONLESS = {
     "phase": "a part of a period",
     "arm_phase": "a part of a period",
     "base_phase": "a part of a period",
+    "along_over_across": "a ratio of frictions",
+    "patch_strength": "a part of the mean",
     "base_from_sensor": "a rotation matrix",
     "base_from_marker": "m, m, rad: in the docstring",
     "bias": "N and N*m: in the docstring",
