@@ -56,10 +56,10 @@ def run(args: argparse.Namespace) -> int:
         out = run_dir.create(args.out, rig.name)
         summary = lockstep(args, rig, out, saved) if simulated else wall_clock(args, rig, out, saved)
     summary["report"] = None
-    run_dir.write_json(out / "summary.json", summary)
+    write_summary(summary, out)
     if not args.no_report:
         report(summary, out)
-        run_dir.write_json(out / "summary.json", summary)
+        write_summary(summary, out)
     for line in verdict.person_lines(summary):
         tell(line) if args.json else print(line)
     if args.json:
@@ -188,6 +188,14 @@ def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
     if figures["tared"]:
         bias = (*figures["bias_force_N"], *figures["bias_torque_Nm"])
         saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
+
+
+def write_summary(summary: dict[str, Any], out: Path) -> None:
+    """Write summary.json; when it cannot be, say so: the verdict is printed all the same."""
+    try:
+        run_dir.write_json(out / "summary.json", summary)
+    except OSError as error:
+        tell(f"summary.json cannot be written: {error.strerror}")
 
 
 def report(summary: dict[str, Any], out: Path) -> None:
