@@ -249,7 +249,7 @@ def test_numbers_beyond_all_reason_do_not_stop_it(ran, ticks, tmp_path):
     for n, tick in enumerate(ticks[::10]):
         value = (math.nan, math.inf, -math.inf, 1e308)[n % 4]
         control = replace(tick.after.control, force_world=(value, value, 0.0), theta_p=value, held_yaw=value)
-        output = replace(tick.output, contact_x=value, faults=(f"$\\frac{{{n}", "\u2603" * 500))
+        output = replace(tick.output, contact_x=value, faults=(f"${n}\\frac{{$", "\u2603" * 500))
         odd.append(replace(tick, after=replace(tick.after, control=control), output=output))
     log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), odd)
     write_report(log, tmp_path / "report.html")
