@@ -14,6 +14,7 @@ from typing import Literal
 from robot_io.base_feed import BaseFeed, BaseOdometry, BasePose, BaseReport, CommandEcho, SliderPose
 from robot_io.clock import NS_PER_S, ClockNs
 from robot_io.driver import DriverBase
+from robot_io.errors import DeviceNotReady
 from robot_io.messages import BaseStatus, BodyTwist, DeviceHealth, DeviceInfo, LinkState, Pose2D, Stamped
 from sim_backend.base_feeds import seen_from
 from sim_backend.plant import BaseSource
@@ -64,7 +65,9 @@ class SimRidgeback(DriverBase):
         return DeviceInfo("ridgeback", "simulated", "Ridgeback")
 
     def start(self) -> None:
-        """Let the feeds run from now on."""
+        """Let the feeds run from now on. Raises DeviceNotReady when not open."""
+        if self._state is LinkState.CLOSED:
+            raise DeviceNotReady("it is not open", where="ridgeback sim", do="Open it first")
         now_ns = self._clock()
         settings = self._settings
         self._origin = self._source.read_base(now_ns).pose

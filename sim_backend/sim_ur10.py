@@ -8,6 +8,7 @@ from __future__ import annotations
 from robot_io.arm_record import NO_ARM, ArmRecord
 from robot_io.clock import NS_PER_S, ClockNs
 from robot_io.driver import DriverBase
+from robot_io.errors import DeviceNotReady
 from robot_io.messages import DeviceHealth, DeviceInfo, JointState, LinkState, Stamped
 from sim_backend.plant import ArmSource
 from sim_backend.ur_modes import RobotMode, RuntimeState, SafetyMode, joint_mode, robot_status_bits, safety_bits
@@ -38,7 +39,9 @@ class SimUr10(DriverBase):
         return DeviceInfo("ur10", "sim", "UR10", "simulated")
 
     def start(self) -> None:
-        """Begin the flow."""
+        """Begin the flow. Raises DeviceNotReady when not open."""
+        if self._state is LinkState.CLOSED:
+            raise DeviceNotReady("it is not open", where="ur10 sim", do="Open it first")
         self._state = LinkState.UP
 
     def read(self) -> ArmRecord | None:
