@@ -1,4 +1,4 @@
-"""Makes a whole log of what is left of a truncated one."""
+"""Makes a whole log of what is left of a truncated one, sealed as it is, so that a later change is seen."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import Writer
 
 from robot_io.errors import LogDamaged, UsageError
+from robot_io.log_seal import LogSeal
 from robot_io.mcap_log import LIBRARY, create_new, finish_writer, flush_writer, start_writer
 from robot_io.mcap_walk import LogItem, walk
 
@@ -43,17 +44,17 @@ def recover(path: Path, out_path: Path) -> Recovered:
             cause = damage.what
         if not cause:
             raise UsageError("the log is whole, there is nothing to recover", where=str(path))
-        if copy.messages == 0:
+        if copy.seal.messages == 0:
             raise LogDamaged(f"no message can be saved: {cause}", where=str(path))
         flush_writer(copy.writer)
-        facts = {"source": path.name, "messages": str(copy.messages), "cause": cause}
+        facts = {"source": path.name, "cause": cause, **copy.seal.facts()}
         copy.writer.add_metadata(RECOVERED_METADATA, facts)
         finish_writer(copy.writer, stream)
     except BaseException:
         stream.close()
         out_path.unlink()
         raise
-    return Recovered(copy.messages, cause)
+    return Recovered(copy.seal.messages, cause)
 
 
 class _Copy:
@@ -61,7 +62,8 @@ class _Copy:
 
     def __init__(self, writer: Writer) -> None:
         self.writer = writer
-        self.messages = 0
+        self.seal = LogSeal()
+        self._topics: dict[int, str] = {}
         self._schemas: dict[int, int] = {}
         self._channels: dict[int, int] = {}
 
@@ -70,10 +72,11 @@ class _Copy:
         if isinstance(item, Message):
             channel_id = self._channels[item.channel_id]
             self.writer.add_message(channel_id, item.log_time, item.data, item.publish_time, item.sequence)
-            self.messages += 1
+            self.seal.note(self._topics[item.channel_id], item.data)
         elif isinstance(item, Schema):
             self._schemas[item.id] = self.writer.register_schema(item.name, item.encoding, item.data)
         elif isinstance(item, Channel):
+            self._topics[item.id] = item.topic
             schema_id = self._schemas[item.schema_id]
             self._channels[item.id] = self.writer.register_channel(
                 item.topic, item.message_encoding, schema_id, item.metadata

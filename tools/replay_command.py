@@ -7,10 +7,14 @@ import math
 from pathlib import Path
 from typing import Any
 
+from robot_io.config import rig_from_toml, rig_to_toml
 from robot_io.error_report import say_json, tell
 from robot_io.errors import ReplayDiffers, UsageError
-from tools.replay import Difference, ReplayResult, load, replay, ticks_of
-from tools.run_facts import machine_facts
+from tools.replay import ReplayResult, replay
+from tools.replay_difference import Difference
+from tools.run_facts import program_and_machine
+from tools.tick_core import TickCore
+from tools.verified_log import VerifiedLog
 
 DIFFERS = ReplayDiffers.exit_code
 
@@ -30,20 +34,21 @@ def run(args: argparse.Namespace) -> int:
     path = Path(args.log)
     if path.is_dir():
         path = path / "run.mcap"
+        if not path.exists():
+            raise UsageError("there is no run.mcap in this folder", where=args.log, do="Name the log itself")
     if args.tolerance is not None and not args.tolerance >= 0.0:
         raise UsageError(f"--tolerance {args.tolerance} is not a distance", where="push replay", do="Give 0 or more")
     if args.what_if:
         return what_if(path, args)
     result = replay(path, tolerance=args.tolerance)
-    different = result.identical < result.ticks or (
-        result.world is not None and result.world.identical < result.world.states
-    )
     show = tell if args.json else print
     show(f"replay: {result.identical} of {result.ticks} ticks identical")
     if result.world is not None:
         show(f"world: {result.world.identical} of {result.world.states} states identical")
     if result.gaps:
         show(f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)")
+    for note in result.notes:
+        show(f"note: {note}")
     differences: list[tuple[str, Difference | None]] = [("tick", result.first_difference)]
     if result.world is not None:
         differences.append(("world state", result.world.first_difference))
@@ -51,12 +56,12 @@ def run(args: argparse.Namespace) -> int:
         if found is not None:
             values = f"logged {found.logged!r}, now {found.replayed!r}"
             show(f"first difference: {name} {found.tick}, {found.field}: {values}")
-    if different:
+    if result.different:
         for line in machine_differences(result.facts):
             show(line)
     if args.json:
         say_json(as_json(result))
-    return DIFFERS if different else 0
+    return DIFFERS if result.different else 0
 
 
 def as_json(result: ReplayResult) -> dict[str, Any]:
@@ -75,13 +80,15 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
             "identical": world.identical,
             "first_difference": _plain(world.first_difference),
         },
+        "complete": result.complete,
+        "notes": list(result.notes),
         "machine_differences": machine_differences(result.facts),
     }
 
 
 def machine_differences(facts: dict[str, str]) -> list[str]:
-    """Return what differs between the machine of the log and this one, in words."""
-    now = machine_facts()
+    """Return what differs between program and machine of the log and of today, in words."""
+    now = program_and_machine()
     return [
         f"{name} was {facts[name]}, is {value}" for name, value in now.items() if name in facts and facts[name] != value
     ]
@@ -89,18 +96,16 @@ def machine_differences(facts: dict[str, str]) -> list[str]:
 
 def what_if(path: Path, args: argparse.Namespace) -> int:
     """Fold the log's inputs with other settings and say what the law would have commanded."""
-    from robot_io.config import rig_from_toml, rig_to_toml
-    from tools.tick_core import TickCore
-
-    _, rig, facts = load(path)
-    other = rig_from_toml(rig_to_toml(rig), overrides=args.what_if)
-    in_contact = facts.get("in_contact") == "True"
-    core = TickCore.of(other, in_contact=in_contact)
+    log = VerifiedLog(path)
+    other = rig_from_toml(rig_to_toml(log.rig), overrides=args.what_if)
+    core = TickCore.of(other, in_contact=log.in_contact)
     state = None
     count = changed = 0
     worst = 0.0
     worst_tick = -1
-    for tick in ticks_of(path, facts):
+    for _, _, tick in log.messages():
+        if tick is None:
+            continue
         state, output = core.fold(tick.before if state is None else state, tick.input)
         old, new = tick.output.wanted_world, output.wanted_world
         off = math.hypot(old.vx - new.vx, old.vy - new.vy)

@@ -9,9 +9,10 @@ from robot_io.config import RigConfig
 PROGRAM_VERSION = "0.1.0"
 
 
-def machine_facts() -> dict[str, str]:
-    """Return what can make a replay differ in the last bit: Python, C library, processor."""
+def program_and_machine() -> dict[str, str]:
+    """Return what can make a replay differ in the last bit: program, Python, C library, processor."""
     return {
+        "program": f"single-point-push {PROGRAM_VERSION}",
         "python": platform.python_version(),
         "libm": " ".join(platform.libc_ver()),
         "machine": platform.machine(),
@@ -21,8 +22,7 @@ def machine_facts() -> dict[str, str]:
 def run_facts(level: str, seed: int, *, in_contact: bool) -> dict[str, str]:
     """Return the facts of a run; none differs between two runs of the same program on the same machine."""
     return {
-        "program": f"single-point-push {PROGRAM_VERSION}",
-        **machine_facts(),
+        **program_and_machine(),
         "level": level,
         "seed": str(seed),
         "in_contact": str(in_contact),

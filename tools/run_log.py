@@ -11,6 +11,7 @@ from pathlib import Path
 from robot_io.config import rig_from_toml
 from robot_io.errors import LogDamaged
 from robot_io.log_channels import BY_TOPIC, CHANNELS, Kind
+from robot_io.log_seal import LogSeal
 from robot_io.mcap_log import McapLog
 from robot_io.ros_messages import POSE_STAMPED, planar_pose
 from robot_io.tick import TICK_CDR, ControlTick
@@ -39,6 +40,7 @@ class RunLog:
         self._topics = TickTopics(wall_offset_ns)
         # With motion capture of the object its pose is what was seen, else it is the world's truth.
         self._slider_is_seen = bool(rig.base.topics.slider_pose) and rig.base.level != "sim"
+        self._seal = LogSeal()
         self.chain = TickChain()
         self.undecodable = 0
         self.unknown_kinds = 0
@@ -79,7 +81,7 @@ class RunLog:
     def finish(self, facts: dict[str, str]) -> None:
         """Close the log with the facts known only now; idempotent."""
         own = {
-            "messages": str(self.messages),
+            **self._seal.facts(),
             "ticks": str(self.chain.ticks),
             "last_tick_crc32": f"{self.chain.crc32:08x}",
             "undecodable": str(self.undecodable),
@@ -100,6 +102,7 @@ class RunLog:
             self._declared.add(message.topic)
             channel = BY_TOPIC[message.topic]
             self._log.channel(channel.topic, channel.cdr_type, latched=channel.latched)
+        self._seal.note(message.topic, message.payload)
         self._log.write(message.topic, message.log_time_ns, message.payload)
 
     def _slider(self, kind: int, time_ns: int, payload: bytes) -> None:

@@ -1,0 +1,51 @@
+"""Where a log and its replay differ first: the field by its dotted name, and both values."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+
+class Difference(msgspec.Struct, frozen=True):
+    """The first place where replay and log differ; of the world, `tick` is the time of the state in ns."""
+
+    tick: int
+    field: str
+    logged: Any
+    replayed: Any
+
+
+def difference(tick: int, logged: Any, mine: Any, tolerance: float | None) -> Difference | None:
+    """Return the first leaf that differs: by a bit (-0.0 is not 0.0, NaN equals NaN), or by more than `tolerance`."""
+    for name, old, new in _leaves(logged, mine):
+        if isinstance(old, float) and isinstance(new, float):
+            same = _same_bits(old, new) if tolerance is None else _close(old, new, tolerance)
+        else:
+            same = type(old) is type(new) and old == new
+        if not same:
+            return Difference(tick, name, old, new)
+    return None
+
+
+def _same_bits(old: float, new: float) -> bool:
+    return struct.pack("<d", old) == struct.pack("<d", new)
+
+
+def _close(old: float, new: float, tolerance: float) -> bool:
+    return old == new or abs(old - new) <= tolerance or (math.isnan(old) and math.isnan(new))
+
+
+def _leaves(logged: Any, mine: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield (dotted name, logged, replayed) of every leaf."""
+    if isinstance(logged, msgspec.Struct) and isinstance(mine, msgspec.Struct):
+        for key in logged.__struct_fields__:
+            yield from _leaves(getattr(logged, key), getattr(mine, key), f"{name}.{key}" if name else key)
+    elif isinstance(logged, tuple) and isinstance(mine, tuple) and len(logged) == len(mine):
+        for i, (old, new) in enumerate(zip(logged, mine, strict=True)):
+            yield from _leaves(old, new, f"{name}[{i}]")
+    else:
+        yield name, logged, mine
