@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ Floats = NDArray[np.float64]
 
 BIGGEST = 1e9
 """Larger numbers, and those that are not finite, become NaN: no quantity of a log is as large, and no axis bears it."""
+
+
+MOST_SPANS = 2000
 
 
 class Series:
@@ -86,3 +90,39 @@ class Tally:
         lows = np.arange(self._BINS + 1) * self.BIN_MS
         counts, _ = np.histogram(lows + self.BIN_MS / 2, bins=edges_ms, weights=np.array(self._counts, dtype=float))
         return counts.astype(np.float64)
+
+
+class Span(NamedTuple):
+    """Something that lasted: a fault (by its id) or a mode (by its number), in s since the first tick."""
+
+    name: str
+    text: str
+    begin_s: float
+    end_s: float
+
+
+class Spans:
+    """Spans under way and over, bounded."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, Span] = {}
+        self._done: list[Span] = []
+
+    def begin(self, key: str, name: str, text: str, time_s: float) -> None:
+        """Begin a span under a key; the one under way there ends."""
+        self.end(key, time_s)
+        if len(self._done) + len(self._open) < MOST_SPANS:
+            self._open[key] = Span(name, text, time_s, time_s)
+
+    def end(self, key: str, time_s: float) -> None:
+        """End the span under a key, if there is one."""
+        span = self._open.pop(key, None)
+        if span is not None:
+            self._done.append(span._replace(end_s=time_s))
+
+    def finish(self, end_s: float, zero_s: float) -> list[Span]:
+        """End what is under way at `end_s` and return all, in order, with times counted from `zero_s`."""
+        for key in list(self._open):
+            self.end(key, end_s)
+        moved = [Span(name, text, begin - zero_s, end - zero_s) for name, text, begin, end in self._done]
+        return sorted(moved, key=lambda span: span.begin_s)

@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_io.tick import Mode
 from tools import plan_view
-from tools.bounded_series import Floats
+from tools.bounded_series import Floats, Span
 from tools.figure_style import (
     BLUE,
     GREEN,
@@ -26,7 +26,7 @@ from tools.figure_style import (
     shade_phases,
     style,
 )
-from tools.run_data import RunData, Span
+from tools.run_data import RunData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

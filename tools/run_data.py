@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
@@ -19,9 +19,8 @@ from robot_io.planar_pose import wrap_angle, yaw_from_quaternion
 from robot_io.ros_messages import POSE_STAMPED
 from robot_io.tick import TICK_CDR, ControlTick, Phase
 from robot_io.world_messages import STATE_CDR
-from tools.bounded_series import Floats, Series, Tally
+from tools.bounded_series import Floats, Series, Span, Spans, Tally
 
-MOST_SPANS = 2000
 MOST_SKIPS = 5000
 
 TICK_COLUMNS = (
@@ -52,15 +51,6 @@ READ: dict[str, CdrType[Any]] = {
     "/slider/pose": POSE_STAMPED,
 }
 """The topics that are read, and what their messages are; all others are passed over."""
-
-
-class Span(NamedTuple):
-    """Something that lasted: a fault (by its id) or a mode (by its number), in s since the first tick."""
-
-    name: str
-    text: str
-    begin_s: float
-    end_s: float
 
 
 @dataclass
@@ -131,8 +121,8 @@ class _Reader:
         self._skips: list[tuple[float, int]] = []
         self._ages = {"ft300": Tally(), "ur10": Tally(), "ridgeback": Tally()}
         self._last_reading_ns = 0
-        self._faults = _Spans()
-        self._modes = _Spans()
+        self._faults = Spans()
+        self._modes = Spans()
         self._first: ControlTick | None = None
         self._last_payload = b""
         self._count = 0
@@ -284,27 +274,3 @@ class _Reader:
         return LogDamaged(
             f"this is no log of a push: {what}", where=str(self._path), do="Give the run.mcap of a `push run`"
         )
-
-
-class _Spans:
-    """Spans under way and over, bounded."""
-
-    def __init__(self) -> None:
-        self._open: dict[str, Span] = {}
-        self._done: list[Span] = []
-
-    def begin(self, key: str, name: str, text: str, time_s: float) -> None:
-        self.end(key, time_s)
-        if len(self._done) + len(self._open) < MOST_SPANS:
-            self._open[key] = Span(name, text, time_s, time_s)
-
-    def end(self, key: str, time_s: float) -> None:
-        span = self._open.pop(key, None)
-        if span is not None:
-            self._done.append(span._replace(end_s=time_s))
-
-    def finish(self, end_s: float, zero_s: float) -> list[Span]:
-        for key in list(self._open):
-            self.end(key, end_s)
-        moved = [Span(name, text, begin - zero_s, end - zero_s) for name, text, begin, end in self._done]
-        return sorted(moved, key=lambda span: span.begin_s)
