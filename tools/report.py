@@ -28,7 +28,7 @@ TEMPLATE = Path(__file__).with_name("report_page.html")
 MOST_SUMMARY_BYTES = 4 << 20
 MOST_ROWS = 200
 CAPTIONS = {
-    "trajectory": "From above, in the frame of the path. Arrows: force on the object; circles: the contact ball, if known.",
+    "trajectory": "From above, in the frame of the path. Arrows: force on the object. Circles: contact ball, if known.",
     "force": "Force on the object, and on a logarithmic scale the raw reading (bias removed) against the limits.",
     "speed": "Speed of the base: what the law wanted, what safety let through, what odometry measured.",
     "tracking": "Lateral offset of the contact point, angles of force and push, heading error of the base.",
