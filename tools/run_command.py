@@ -11,7 +11,7 @@ from typing import Any
 
 from robot_io.config import RigConfig
 from robot_io.error_report import say_json, tell
-from robot_io.errors import PushError, UsageError
+from robot_io.errors import UsageError
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools import run_dir, saved_tare, verdict
 from tools.live_line import LiveLine
@@ -125,13 +125,14 @@ def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
 
 def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
     """Run the processes of a wall-clock run and return its summary."""
-    from tools.launcher import Launcher
-
-    launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig))
+    launcher = None
     try:
+        from tools.launcher import Launcher
+
+        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig))
         figures = launcher.run()
-    except PushError:
-        if not launcher.began:
+    except BaseException:
+        if launcher is None or not launcher.began:
             run_dir.discard(out)
         raise
     keep_tare(rig, figures)
