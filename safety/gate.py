@@ -166,8 +166,9 @@ def _judge(limits: GateLimits, state: GateState, frame: GateFrame | None, now_ns
     ):
         return Latch.ENVELOPE
     if not _reduces(twist, state.twist):
-        time_s = (frame.tick - max(state.tick, 0)) * limits.period_ns * 1e-9 if state.tick >= 0 else 0.0
-        time_s = max(time_s, limits.period_ns * 1e-9)
+        ticks = frame.tick - state.tick if state.tick >= 0 else 1
+        # More ticks than fit into the longest silence allowed are no excuse for a jump.
+        time_s = min(ticks * limits.period_ns, FRAME_MAX_AGE_NS + limits.period_ns) * 1e-9
         step = math.hypot(twist.vx - state.twist.vx, twist.vy - state.twist.vy)
         turn_step = abs(twist.omega - state.twist.omega)
         if (
