@@ -8,10 +8,12 @@ Reading accepts only what writing would produce, padding included, and makes not
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any
 
+from robot_io.cdr_packer import packer_of
 from robot_io.cdr_shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text, builder, leaves
 
 HEADER_BYTES = 4
@@ -78,12 +80,11 @@ class _Run(_Part):
     """Numbers and fixed arrays of numbers, packed in one call."""
 
     def __init__(self, items: list[tuple[str, Scalar, int | None]]) -> None:
+        self._paths = [(path, count) for path, _, count in items]
+        self._pack: Callable[[Any, Callable[..., bytes]], bytes] | None = None
         self._counts = [count for _, _, count in items]
-        self._flat = all(count is None for count in self._counts)
-        self._get = attrgetter(*(path for path, _, _ in items))
-        self._single = len(items) == 1
         self._enums = [scalar.enum for _, scalar, _ in items]
-        self._plain = self._flat and not any(self._enums)
+        self._plain = not any(self._counts) and not any(self._enums)
         self._packers = [struct.Struct(_format(items, start)) for start in range(8)]
         # Only these bytes can differ from what would be written again: padding, and bools.
         self._loose = [
@@ -92,18 +93,9 @@ class _Run(_Part):
         self.min_bytes = sum(PRIMITIVES[scalar.ros][1] * (count or 1) for _, scalar, count in items)
 
     def write(self, owner: Any, out: bytearray) -> None:
-        values: Iterable[Any] = (self._get(owner),) if self._single else self._get(owner)
-        if not self._flat:
-            flat: list[Any] = []
-            for value, count in zip(values, self._counts, strict=True):
-                if count is None:
-                    flat.append(value)
-                elif len(value) == count:
-                    flat.extend(value)
-                else:
-                    raise ValueError(f"an array of {len(value)} where {count} belong")
-            values = flat
-        out += self._packers[(len(out) - HEADER_BYTES) & 7].pack(*values)
+        if self._pack is None:  # at the first use: most types of a log are only ever read
+            self._pack = packer_of(self._paths)
+        out += self._pack(owner, self._packers[(len(out) - HEADER_BYTES) & 7].pack)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         offset = (at - HEADER_BYTES) & 7
@@ -261,7 +253,9 @@ def _format(items: list[tuple[str, Scalar, int | None]], start: int) -> str:
 
 
 def _pad(out: bytearray, size: int) -> None:
-    out += bytes(-(len(out) - HEADER_BYTES) % size)
+    gap = (HEADER_BYTES - len(out)) % size
+    if gap:
+        out += bytes(gap)
 
 
 def _aligned(payload: bytes, at: int, size: int) -> int:
@@ -286,9 +280,14 @@ def _read_count(payload: bytes, at: int, element_bytes: int) -> tuple[int, int]:
 
 
 def _write_text(text: str, out: bytearray) -> None:
+    _pad(out, 4)
+    out += _text_bytes(text)
+
+
+@lru_cache(maxsize=500)  # frame names, in every header
+def _text_bytes(text: str) -> bytes:
     raw = text.encode()
-    _write_count(len(raw) + 1, out)
-    out += raw + b"\x00"
+    return _COUNT.pack(len(raw) + 1) + raw + b"\x00"
 
 
 def _read_text(payload: bytes, at: int) -> tuple[str, int]:

@@ -11,10 +11,9 @@ import os
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mcap.writer import CompressionType, Writer
-
 from robot_io.cdr import CdrType
 from robot_io.errors import EnvironmentFault, UsageError
+from robot_io.mcap_writer import McapWriter
 
 PROFILE = "ros2"
 LIBRARY = "single-point-push"
@@ -46,7 +45,7 @@ class McapLog:
         self.path = path
         self.messages = 0
         self._stream = create_new(path)
-        self._writer = start_writer(self._stream, LIBRARY)
+        self._writer = McapWriter(self._stream, PROFILE, LIBRARY)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._sequences: dict[str, int] = {}
@@ -74,13 +73,13 @@ class McapLog:
 
     def flush(self) -> None:
         """Hand everything to the operating system: it then survives the death of this process."""
-        flush_writer(self._writer)
+        self._writer.flush()
 
     def finish(self, metadata_end: dict[str, str]) -> None:
         """Close the log properly, with the facts known only at the end; idempotent."""
         if self._stream.closed:
             return
-        flush_writer(self._writer)
+        self._writer.flush()
         self._writer.add_metadata(END_METADATA, metadata_end)
         finish_writer(self._writer, self._stream)
 
@@ -104,21 +103,9 @@ def create_new(path: Path) -> BinaryIO:
         ) from None
 
 
-def start_writer(stream: BinaryIO, library: str) -> Writer:
-    """Return a started MCAP writer with this program's profile, compression and checksums."""
-    writer = Writer(stream, compression=CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
-    writer.start(PROFILE, library)
-    return writer
-
-
-def flush_writer(writer: Writer) -> None:
-    """End the chunk in progress and hand everything to the operating system."""
-    writer.flush()  # type: ignore[no-untyped-call]  # mcap 1.6 leaves it without annotations
-
-
-def finish_writer(writer: Writer, stream: BinaryIO) -> None:
+def finish_writer(writer: McapWriter, stream: BinaryIO) -> None:
     """Write the summary, bring the file to the disk and close it."""
-    writer.finish()  # type: ignore[no-untyped-call]  # as above
+    writer.finish()
     stream.flush()
     os.fsync(stream.fileno())
     stream.close()

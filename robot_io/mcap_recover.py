@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
-from mcap.writer import Writer
 
 from robot_io.errors import LogDamaged, UsageError
 from robot_io.log_seal import LogSeal
-from robot_io.mcap_log import LIBRARY, create_new, finish_writer, flush_writer, start_writer
+from robot_io.mcap_log import LIBRARY, PROFILE, create_new, finish_writer
 from robot_io.mcap_walk import LogItem, walk
+from robot_io.mcap_writer import McapWriter
 
 RECOVERED_METADATA = "recovered"
 
@@ -34,7 +34,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
     first = next(items)  # nothing is created for a file that is no log
     stream = create_new(out_path)
     try:
-        copy = _Copy(start_writer(stream, LIBRARY))
+        copy = _Copy(McapWriter(stream, PROFILE, LIBRARY))
         cause = ""
         try:
             copy.take(first)
@@ -46,7 +46,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
             raise UsageError("the log is whole, there is nothing to recover", where=str(path))
         if copy.seal.messages == 0:
             raise LogDamaged(f"no message can be saved: {cause}", where=str(path))
-        flush_writer(copy.writer)
+        copy.writer.flush()
         facts = {"source": path.name, "cause": cause, **copy.seal.facts()}
         copy.writer.add_metadata(RECOVERED_METADATA, facts)
         finish_writer(copy.writer, stream)
@@ -60,7 +60,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
 class _Copy:
     """The records written so far, under their new numbers."""
 
-    def __init__(self, writer: Writer) -> None:
+    def __init__(self, writer: McapWriter) -> None:
         self.writer = writer
         self.seal = LogSeal()
         self._topics: dict[int, str] = {}
