@@ -149,7 +149,7 @@ def one_error(ended: Ended, code: int) -> dict[str, Any]:
     assert error["code"] == code
     sentences = [line for line in ended.err.splitlines() if line.startswith("push: ")]
     assert len(sentences) == 1, ended.err
-    assert error["what"] in sentences[0]
+    assert error["what"] in ended.err
     return error
 
 

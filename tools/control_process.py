@@ -47,9 +47,7 @@ def main() -> int:
     core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = BaseLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
-    watch = Watch(
-        gate=os.pidfd_open(job.gate_pid), arm=os.pidfd_open(job.arm_pid), recorder=os.pidfd_open(job.recorder_pid)
-    )
+    watch = Watch(gate=job.gate_pidfd, arm=job.arm_pidfd, recorder=job.recorder_pidfd)
     loop = ControlLoop(
         core.fold,
         first_state(job.saved_tare),

@@ -21,9 +21,9 @@ class ControlJob(msgspec.Struct, frozen=True):
     alive_fd: int
     operator_fd: int
     status_fd: int
-    gate_pid: int
-    arm_pid: int
-    recorder_pid: int
+    gate_pidfd: int
+    arm_pidfd: int
+    recorder_pidfd: int
 
 
 class EmulatorJob(msgspec.Struct, frozen=True):

@@ -5,6 +5,7 @@
     alive pipes        control, gate, emulators -> recorder          nothing is written: EOF says that it is gone
     gate link          control <-> gate                              SEQPACKET; EOF says that control is gone
     records            gate -> control, arm -> control               memfd, newest wins
+    pidfds             gate, arm, recorder -> control                readable when the process is gone
     operator pipe      launcher -> control                           one byte each: go, stop, resume
     status pipes       each of them -> launcher                      JSON lines
 
@@ -189,6 +190,8 @@ class Processes:
 
     def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:
         ring_fd, alive_fd = self._rings["control"].fd, self._alive["control"][1]
+        # Opened here, where a process that has ended already can still be opened: nobody has waited for it yet.
+        pidfds = [os.pidfd_open(self.children[name].pid) for name in ("gate", "arm", "recorder")]
         job = ControlJob(
             rig_to_toml(rig),
             rig.ft.port,
@@ -201,8 +204,9 @@ class Processes:
             alive_fd,
             operator_fd,
             -1,
-            self.children["gate"].pid,
-            self.children["arm"].pid,
-            self.children["recorder"].pid,
+            *pidfds,
         )
-        self._spawn("control", "tools.control_process", job, [gate_fd, base_fd, arm_fd, ring_fd, alive_fd, operator_fd])
+        fds = [gate_fd, base_fd, arm_fd, ring_fd, alive_fd, operator_fd, *pidfds]
+        self._spawn("control", "tools.control_process", job, fds)
+        for pidfd in pidfds:
+            os.close(pidfd)
