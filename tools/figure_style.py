@@ -91,6 +91,14 @@ def png(figure: Figure, dpi: float = DPI) -> bytes:
     return target.getvalue()
 
 
+def warm_up() -> None:
+    """Load what drawing needs (matplotlib, its fonts) by drawing an empty figure."""
+    with style():
+        figure = new_figure(1.0)
+        figure.subplots()
+        png(figure)
+
+
 def plain(text: str, most: int = 40) -> str:
     """Return text of a log as the figure's font can write it."""
     kept = "".join(letter if " " <= letter <= "~" else "?" for letter in text)

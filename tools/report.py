@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import html
+import importlib
 import json
 import os
 import re
@@ -191,11 +192,18 @@ def _esc(text: str) -> str:
 
 
 def main(argv: Sequence[str]) -> int:
-    """LOG HTML [PARENT]: write the report, and die with process PARENT; one line on stderr says what went wrong."""
-    from robot_io.process import die_with_parent
+    """LOG HTML PARENT: load, wait for a byte on stdin, write the report; die with process PARENT.
 
-    if len(argv) > 2:
-        die_with_parent(int(argv[2]))
+    One line on stderr says what went wrong.
+    """
+    from robot_io.process import die_with_parent
+    from tools.figure_style import warm_up
+
+    die_with_parent(int(argv[2]))
+    importlib.import_module("tools.report_figures")
+    warm_up()
+    if not sys.stdin.buffer.read(1):
+        return 1
     try:
         write_report(Path(argv[0]), Path(argv[1]))
     except PushError as error:

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 from robot_io.config import RigConfig
 from robot_io.error_report import say_json, tell
-from robot_io.errors import UsageError
+from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools import run_dir, saved_tare, verdict
 from tools.live_line import LiveLine
+from tools.report_process import ReportProcess
 from tools.rig import devices_at, resolve_rig
 from tools.run_facts import level_of
 from tools.run_state import status_line
 from tools.saved_tare import SavedTare
 from tools.state_dir import RigLock
 
-REPORT_TIMEOUT_S = 60.0
 LARGEST_SEED = 2**63 - 1
 """What the log can hold."""
 
@@ -54,11 +51,17 @@ def run(args: argparse.Namespace) -> int:
         announce(rig)
     with RigLock(rig.name) if not simulated else _NoLock():
         out = run_dir.create(args.out, rig.name)
-        summary = lockstep(args, rig, out, saved) if simulated else wall_clock(args, rig, out, saved)
+        early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
+        try:
+            summary = lockstep(args, rig, out, saved) if simulated else wall_clock(args, rig, out, saved)
+        except BaseException:
+            if early is not None:
+                early.drop()
+            raise
     summary["report"] = None
     write_summary(summary, out)
     if not args.no_report:
-        report(summary, out)
+        report(summary, out, early)
         write_summary(summary, out)
     for line in verdict.person_lines(summary):
         tell(line) if args.json else print(line)
@@ -199,36 +202,17 @@ def write_summary(summary: dict[str, Any], out: Path) -> None:
         tell(f"summary.json cannot be written: {error.strerror}")
 
 
-def report(summary: dict[str, Any], out: Path) -> None:
-    """Write report.html and name it in `summary`; a report that cannot be made is said, and is no failure of the run.
-
-    It is made in a process of its own, from the log alone.
-    """
-    page = out / "report.html"
-    command = [sys.executable, "-m", "tools.report", str(summary["log"]), str(page), str(os.getpid())]
+def report(summary: dict[str, Any], out: Path, ready: ReportProcess | None) -> None:
+    """Write report.html, by the process that is `ready` or a new one, and name it in `summary`."""
     try:
-        made = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            timeout=REPORT_TIMEOUT_S,
-            start_new_session=True,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        reason = f"it took longer than {REPORT_TIMEOUT_S:g} s"
-    except KeyboardInterrupt:
-        reason = "stopped by the operator"
-    except OSError as error:
-        reason = str(error)
-    else:
-        words = made.stderr.decode(errors="replace").strip().splitlines()
-        reason = (words[-1] if words else f"its process ended with code {made.returncode}") if made.returncode else ""
+        making = ready or ReportProcess(Path(summary["log"]), out / "report.html")
+        reason = making.make()
+    except EnvironmentFault as fault:
+        reason = str(fault)
     if reason:
         tell(f"no report: {reason}; `push report {out}` makes one from the log")
     else:
-        summary["report"] = str(page)
+        summary["report"] = str(out / "report.html")
 
 
 class _NoLock:

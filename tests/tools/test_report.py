@@ -21,7 +21,7 @@ from robot_io.log_channels import Kind
 from robot_io.mcap_read import read_log, read_summary
 from robot_io.mcap_recover import recover
 from robot_io.tick import TICK_CDR, ControlTick, Phase
-from tools import run_command
+from tools import report_process, run_command
 from tools.cli import main
 from tools.report import page, run_mark, write_report
 from tools.report_words import baseline_of, differences, tiles, verdict
@@ -349,13 +349,13 @@ def test_push_report_of_what_is_no_log(tmp_path, capsys, content, code):
 def test_a_report_that_fails_is_said_and_fails_nothing(tmp_path, capsys, monkeypatch):
     (tmp_path / "run.mcap").write_bytes(b"nonsense")
     summary: dict[str, Any] = {"log": str(tmp_path / "run.mcap"), "report": None}
-    run_command.report(summary, tmp_path)
+    run_command.report(summary, tmp_path, None)
     assert summary["report"] is None
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "this is no MCAP file" in said
-    monkeypatch.setattr(run_command, "REPORT_TIMEOUT_S", 0.001)
-    run_command.report(summary, tmp_path)
+    monkeypatch.setattr(report_process, "TIMEOUT_S", 0.001)
+    run_command.report(summary, tmp_path, None)
     assert summary["report"] is None
     assert "took longer than" in capsys.readouterr().err
 
