@@ -160,7 +160,7 @@ class EventLoop:
     def _arm(self) -> None:
         while self._heap and self._heap[0][2].callback is None:
             heapq.heappop(self._heap)
-        wanted = self._heap[0][0] if self._heap else 0
+        wanted = max(self._heap[0][0], 1) if self._heap else 0  # 0 would disarm
         if wanted != self._armed_ns:
             self._timer_fd.set_ns(wanted)
             self._armed_ns = wanted

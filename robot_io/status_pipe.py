@@ -16,13 +16,16 @@ class StatusPipe:
 
     def __init__(self, fd: int) -> None:
         self._fd = fd
+        self._cut = False
         os.set_blocking(fd, False)
 
     def say(self, event: str, **facts: object) -> None:
         """Send one line: {"event": event, ...facts}."""
         line = msgspec.json.encode({"event": event, **facts}) + b"\n"
+        if self._cut:  # the line before went in by half: end it, so that it does not swallow this one
+            line = b"\n" + line
         with contextlib.suppress(OSError):
-            os.write(self._fd, line)
+            self._cut = os.write(self._fd, line) < len(line)
 
     def error(self, error: PushError) -> None:
         """Send {"event": "error", "error": {code, what, where, do}}."""
