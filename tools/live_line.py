@@ -56,6 +56,8 @@ class LiveLine:
             self._width = 0
 
     def _line(self, status: dict[str, Any]) -> str:
+        # JSON has no NaN: a figure that is not known yet (no pose so far) arrives as null.
+        status = {key: math.nan if value is None else value for key, value in status.items()}
         fx, fy, _ = status["force_N"]
         control = self._rig.control
         return (
