@@ -81,9 +81,9 @@ class QpSolver:
         jn = cx * ny - cy * nx
         jt = cx * nx + cy * ny
         pxx, pxy, pyy = grain or (1.0, 0.0, 1.0)
-        p = np.array([[pxx, pxy], [pxy, pyy]])
-        axes = np.array([[nx, ny], [-ny, nx]])
-        (pnn, pnt), (_, ptt) = (axes @ p @ axes.T).tolist()
+        pnn = pxx * nx * nx + 2.0 * pxy * nx * ny + pyy * ny * ny
+        pnt = (pyy - pxx) * nx * ny + pxy * (nx * nx - ny * ny)
+        ptt = pxx * ny * ny - 2.0 * pxy * nx * ny + pyy * nx * nx
         # A^-1 by its adjugate: A = P + J J'/d^2
         dd = d_m * d_m
         ann, ant, att = pnn + jn * jn / dd, pnt + jn * jt / dd, ptt + jt * jt / dd

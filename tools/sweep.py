@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import signal
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     if args.resume and not args.out:
         raise UsageError("--resume needs the folder to go on with", do="Add --out DIR")
     out = Path(args.out) if args.out else Path("sweeps") / f"{plan.name}-{time.strftime('%Y%m%d-%H%M%S')}"
-    with engine(args.engine, args.scheduler):
+    with _terminate_as_interrupt(), engine(args.engine, args.scheduler):
         store = Store(out, plan.name, fingerprint(plan.definition, plan.sources), resume=args.resume)
         finished = store.finished(len(plan.items))
         left = [(i, item) for i, item in enumerate(plan.items) if i not in finished]
@@ -84,6 +87,20 @@ def _plan(args: argparse.Namespace) -> Plan:
     if args.grid == "paper":
         return lanes_plan(paper_study(changes, args.dt))
     return lanes_plan(load_grid(Path(args.grid), changes, args.dt))
+
+
+@contextlib.contextmanager
+def _terminate_as_interrupt() -> Iterator[None]:
+    """Make SIGTERM what Ctrl-C is: what is finished stays, the workers end."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _gains(text: str) -> tuple[float, float]:

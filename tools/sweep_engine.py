@@ -6,9 +6,10 @@ import contextlib
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from robot_io.errors import EnvironmentFault, UsageError
+from robot_io.errors import EnvironmentFault, PushError, UsageError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -86,6 +87,10 @@ def run_items(
         results = pool(joblib.delayed(_numbered)(function, number, item) for number, item in items)
         try:
             yield from results
+        except BrokenProcessPool:
+            raise PushError(
+                "a worker process died (was memory short?)", do="Go on with --resume, and fewer --workers if need be"
+            ) from None
         except BaseException:
             if local:
                 _end_workers()

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 SAMPLE_SECONDS = 120.0
 """Of a sample's ten minutes, what is drawn."""
 OUTLINE_EVERY_S = 15.0
+MOST_LINES = 1000
+"""Of more trajectories in a panel, some evenly spaced ones are drawn."""
 
 
 def save(figure: Figure, out: Path, name: str) -> list[str]:
@@ -40,10 +42,12 @@ def trajectories(cases: Sequence[Case], states: Floats, title: str) -> Figure:
     panels = figure.subplots(len(shapes), 1, sharex=True, squeeze=False)[:, 0]
     for axes, shape in zip(panels, shapes, strict=True):
         chosen = [i for i, case in enumerate(cases) if case.shape == shape]
-        for i in chosen:
+        drawn = chosen[:: -(-len(chosen) // MOST_LINES)]
+        for i in drawn:
             axes.plot(states[i, :, 0], states[i, :, 1], linewidth=0.5, alpha=0.4)
         axes.axhline(0.0, color="black", linewidth=0.8, linestyle="--")
-        axes.set_title(f"{shape}: {len(chosen)} pushes", fontsize=9)
+        some = "" if len(drawn) == len(chosen) else f", {len(drawn)} of them drawn"
+        axes.set_title(f"{shape}: {len(chosen)} pushes{some}", fontsize=9)
         axes.set_ylabel("y (m)")
     panels[-1].set_xlabel("x (m)")
     figure.suptitle(title, fontsize=10)

@@ -25,6 +25,8 @@ from sim_backend.lanes import Lane, Timing
 from sim_backend.slider import Circle, Rectangle, pressure_distance_m
 
 MOST_CASES = 1_000_000
+MOST_STATES = 20_000_000
+"""Kept states of a study: about a gigabyte."""
 
 
 class Case(Table, frozen=True):
@@ -111,7 +113,14 @@ def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None)
     )
     for case in cases:
         lane_of(case)  # an impossible slider is found before anything runs
-    return Study(file.name, cases, timing_of(file.time, dt_s, name))
+    timing = timing_of(file.time, dt_s, name)
+    if len(cases) * timing.records > MOST_STATES:
+        raise ConfigError(
+            f"this grid would keep {len(cases) * timing.records} states, more than {MOST_STATES}",
+            where=name,
+            do="Raise record_s, or run fewer cases",
+        )
+    return Study(file.name, cases, timing)
 
 
 def _combinations(file: GridFile, origins: Origins, name: str) -> list[dict[str, Any]]:

@@ -34,23 +34,21 @@ def fingerprint(what: object, sources: Sequence[Path]) -> str:
 class Store:
     """A study's folder. Raises UsageError if it cannot be used.
 
-    out: the folder, made if need be. mark: the study's fingerprint. resume: whether to go on with what is there.
+    out: the folder, made if need be. mark: the study's fingerprint. resume: whether to go on with
+    what is there (nothing at all is fine, so that a job that may be restarted can always say so).
     """
 
     def __init__(self, out: Path, name: str, mark: str, *, resume: bool) -> None:
         self.out = out
         self._mark = mark
         found = _found(out)
-        if found is None:
-            if resume:
-                raise UsageError("there is no study to resume", where=str(out), do="Leave out --resume")
-        elif found != mark:
+        if found is not None and found != mark:
             raise UsageError(
                 "this folder holds another study (or one of another version of the program)",
                 where=str(out),
                 do="Give another --out",
             )
-        elif not resume:
+        if found is not None and not resume:
             raise UsageError(
                 "this folder already holds this study", where=str(out), do="Add --resume, or give another --out"
             )

@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robot_io.errors import PushError
 from tools import cli, sweep_items
+from tools.sweep_engine import run_items
 from tools.sweep_items import COLUMNS
 
 GRID = """
@@ -236,7 +238,7 @@ def test_a_bad_grid_is_one_sentence_and_makes_nothing(tmp_path, grid, capsys, ol
         ["--dt", "nan"],
         ["--dt", "0"],
         ["--workers", "0"],
-        ["--resume"],
+        ["--resume"],  # without --out
         ["--engine", "dask"],
         ["--scheduler", "tcp://127.0.0.1:1"],
         ["--engine", "slurm"],
@@ -272,7 +274,8 @@ def test_foreign_finished_and_unwritable_folders_are_refused_untouched(tmp_path,
 
 
 @pytest.mark.long
-def test_ctrl_c_leaves_a_resumable_state_and_no_process(tmp_path, capsys):
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_leaves_a_resumable_state_and_no_process(tmp_path, capsys, stop):
     path = tmp_path / "long.toml"
     path.write_text(
         'name = "long"\n[grid]\ny0_m = [0.1, 0.2]\n[random]\nsamples = 400\n[random.ranges]\ns0_m = [0, 0.1]\n'
@@ -289,7 +292,10 @@ def test_ctrl_c_leaves_a_resumable_state_and_no_process(tmp_path, capsys):
             assert child.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.02)
-        os.killpg(child.pid, signal.SIGINT)  # as a terminal does
+        if stop == signal.SIGINT:
+            os.killpg(child.pid, stop)  # as a terminal does
+        else:
+            child.send_signal(stop)
         stdout, stderr = child.communicate(timeout=30)
     finally:
         if child.poll() is None:
@@ -318,3 +324,10 @@ def _group_alive(group):
     except ProcessLookupError:
         return False
     return True
+
+
+@pytest.mark.long
+def test_a_worker_that_dies_is_one_sentence():
+    with pytest.raises(PushError, match="worker process died"):
+        list(run_items(os._exit, [(0, 1), (1, 1), (2, 1)], 2, local=True))
+    assert sorted(run_items(abs, [(0, -1), (1, -2)], 2, local=True)) == [(0, 1), (1, 2)]
