@@ -81,6 +81,7 @@ class GateProcess:
         self._loop.add_fd(self._control.fileno(), self._on_control)
         self._loop.add_fd(self._base_fd, self._on_base)
         self._loop.call_every(CLOCK_NS, self._on_clock)
+        self._take(self._base.drain())  # what came while it started: control's first record already holds a pose
         self._publish()
         try:
             self._loop.run()
