@@ -99,8 +99,14 @@ class Launcher:
         pids = {"schema": 1, "launcher": os.getpid(), **self._processes.pids}
         run_dir.write_json(self._out / "processes.json", pids)
         self._wait_ready(names, READY_NS)
+        self._tell_priorities()
         self._began = True
         self._processes.tell_control(b"G")
+
+    def _tell_priorities(self) -> None:
+        plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
+        if plain:
+            self._live.say(f"no right to real-time priority for {', '.join(plain)}: supported at 100 Hz")
 
     def _listen(self, child: Child) -> None:
         self._loop.add_fd(child.status.fd, lambda _events: self._hear(child))
