@@ -37,6 +37,7 @@ CHUNK_BYTES = 1 << 20
 
 _MESSAGE = struct.Struct("<BQHIQQ")
 _MESSAGE_FIXED = _MESSAGE.size - 9
+_MESSAGE_OPCODE = int(Opcode.MESSAGE)
 _INDEX = struct.Struct("<BQHI")
 _FOOTER = struct.Struct("<BQQQ")
 
@@ -83,7 +84,9 @@ class McapWriter:
         if entry is None:
             entry = self._index[channel_id] = []
         entry += (log_time, len(chunk))
-        chunk += _MESSAGE.pack(Opcode.MESSAGE, _MESSAGE_FIXED + len(data), channel_id, sequence, log_time, publish_time)
+        chunk += _MESSAGE.pack(
+            _MESSAGE_OPCODE, _MESSAGE_FIXED + len(data), channel_id, sequence, log_time, publish_time
+        )
         chunk += data
         if len(chunk) > CHUNK_BYTES:
             self._end_chunk()
