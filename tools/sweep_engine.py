@@ -6,7 +6,6 @@ import contextlib
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from robot_io.errors import EnvironmentFault, PushError, UsageError
@@ -77,6 +76,7 @@ def run_items(
             yield number, function(item)
         return
     import joblib
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     pool: Any = joblib.Parallel(
         n_jobs=workers if local else -1, batch_size=1, return_as="generator_unordered", pre_dispatch="2*n_jobs"
@@ -87,7 +87,7 @@ def run_items(
         results = pool(joblib.delayed(_numbered)(function, number, item) for number, item in items)
         try:
             yield from results
-        except BrokenProcessPool:
+        except TerminatedWorkerError:
             raise PushError(
                 "a worker process died (was memory short?)", do="Go on with --resume, and fewer --workers if need be"
             ) from None
