@@ -37,15 +37,16 @@ def engine(name: str, scheduler: str | None) -> Iterator[None]:
     if not scheduler:
         raise UsageError("--engine dask needs the scheduler's address", do="Add --scheduler tcp://HOST:PORT")
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise EnvironmentFault(
             "dask.distributed is not installed", do="Install it with: .venv/bin/pip install -e '.[cluster]'"
         ) from None
     import joblib
 
+    connect: Any = distributed.Client  # distributed has no types here
     try:
-        client = Client(scheduler, timeout=SCHEDULER_TIMEOUT_S, set_as_default=True)
+        client = connect(scheduler, timeout=SCHEDULER_TIMEOUT_S, set_as_default=True)
     except (OSError, ValueError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise EnvironmentFault(
