@@ -1,6 +1,7 @@
 """The sequence of a push through the real fold: settle, tare, approach, push, lose and find again, rest, check."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from msgspec.structs import replace
@@ -431,3 +432,89 @@ def test_a_sensor_that_does_not_read_zero_afterwards_is_told():
     assert bench.state.control.residual_N == pytest.approx(5.5, abs=0.2)
     assert bench.output.faults == ("F09",)
     assert bench.output.exit_code == 0
+
+
+def test_a_finished_push_stays_finished():
+    for bench in (pushing(), lost()):
+        bench.run_until(lambda b: b.output.finished, None if bench.state.control.phase == Phase.PUSH else no_force)
+        phase = bench.state.control.phase
+        for _ in range(5):
+            bench.fold()
+            assert bench.state.control.phase == phase in (Phase.DONE, Phase.FAILED)
+            assert bench.output.command_body == BodyTwist()
+
+
+# --- held by safety ----------------------------------------------------------------------------------------------
+
+
+def old_arm(inp, _=0):
+    """Return the input with an arm record of 70 ms ago: HOLD, and it clears by itself."""
+    at = inp.now_ns - 70_000_000
+    return replace(inp, arm=replace(inp.arm, published_ns=at, changed_ns=at))
+
+
+def test_a_hold_ramps_down_and_the_push_ramps_up_again_from_rest():
+    bench = pushing()
+    for n in range(30):
+        bench.fold(old_arm, n)
+    assert bench.output.command_body == BodyTwist()
+    bench.run_until(lambda b: b.output.mode == Mode.PUSHING)
+    speeds = []
+    for _ in range(120):
+        bench.fold()
+        speeds.append(bench.output.command_body.vx)
+    assert speeds[0] < 0.005
+    assert all(b - a < 0.0011 for a, b in pairwise(speeds))  # 0.1 m/s in 1 s
+    assert speeds[-1] == pytest.approx(0.1, abs=1e-4)
+
+
+def test_no_deadline_of_the_search_runs_while_the_base_is_held():
+    """2 s of search, 5 s held, and the last second of the search is still there."""
+    bench = lost(overrides=("control.force_filter_tau_s=0", "control.lost_distance_m=2"))
+    for n in range(200):
+        bench.fold(no_force, n)
+    for n in range(500):
+        bench.fold(lambda inp, n: old_arm(no_force(inp)), n)
+        assert bench.state.control.phase == Phase.LOST
+    held = bench.run_until(lambda b: b.output.mode < Mode.HOLD, no_force)
+    ticks = bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
+    assert 99 <= held <= 101  # the clean second
+    assert 95 <= ticks <= 101
+
+
+def test_an_approach_that_was_held_ramps_up_again():
+    bench = FoldBench().run_to(Phase.APPROACH)
+    for n in range(60):
+        bench.fold(no_force, n)
+    for n in range(30):
+        bench.fold(lambda inp, n: old_arm(no_force(inp)), n)
+    bench.run_until(lambda b: b.output.mode == Mode.PUSHING, no_force)
+    speeds = []
+    for _ in range(110):
+        bench.fold(no_force)
+        speeds.append(bench.output.command_body.vx)
+    assert bench.state.control.phase == Phase.APPROACH
+    assert speeds[0] < 0.003
+    assert speeds[-1] == pytest.approx(0.05, abs=1e-9)
+
+
+def test_the_message_of_a_tick_holds_all_of_it():
+    from tools.tick_core import tick_message
+
+    bench = pushing()
+    before = bench.state
+    bench.fold()
+    message = tick_message(bench.inp, before, bench.state, bench.output)
+    assert (message.input, message.before, message.after, message.output) == (
+        bench.inp, before, bench.state, bench.output,
+    )  # fmt: skip
+    assert (message.crc32_before, message.reserved) == (0, 0)  # the recorder chains it
+
+
+def test_the_fold_is_pure():
+    """Same arguments, same result, and the arguments are left alone."""
+    bench = pushing()
+    inp, state = bench.good_input(), bench.state
+    first, again = bench.core.fold(state, inp), bench.core.fold(state, inp)
+    assert first == again
+    assert state == bench.state

@@ -13,7 +13,7 @@ from safety import arm_checks, base_checks, host_checks, sensor_checks, supervis
 from safety.faults import FAULTS, Clears, strongest
 from tests.mutants import load, tree_of
 from tests.safety.fault_scenarios import BY_THE_GATE, SCENARIOS, Scenario
-from tests.safety.fold_bench import FoldBench
+from tests.safety.fold_bench import FoldBench, pushing
 
 ids = [str(s) for s in SCENARIOS]
 
@@ -183,6 +183,24 @@ def test_every_row_has_a_check_to_remove():
     by_give_up = {"F68"}  # raised by the fold itself, see the tests of the supervisor
     rows = {row for row, _, _ in PLACES}
     assert set(FAULTS) - rows - set(BY_THE_GATE) - by_give_up == set()
+
+
+def test_one_jump_told_again_and_again_is_one_jump():
+    """A pose message is judged once, however many ticks see it; the next good one clears it."""
+    bench = pushing()
+    jumped = bench.good_input().base.pose
+
+    def same_message(inp, _):
+        pose = replace(jumped, x=jumped.x + 0.2)
+        return replace(inp, base=replace(inp.base, pose=pose, pose_seq=bench_seq))
+
+    bench_seq = bench.tick + 1
+    for n in range(4):
+        bench.fold(same_message, n)
+        assert bench.state.safety.pose_jumps == 1
+    bench.fold()
+    assert bench.state.safety.pose_jumps == 0
+    assert bench.output.faults == ()
 
 
 def test_a_wanted_velocity_that_is_no_number_is_a_fault_by_itself():

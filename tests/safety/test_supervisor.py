@@ -247,6 +247,13 @@ def test_devices_still_silent_a_tick_later_are_held_and_after_that_stopped():
     assert bench.output.mode == Mode.STOP
 
 
+def test_a_soft_row_after_a_pause_stays_what_it_is():
+    bench = paused(4)
+    bench.fold(lambda inp, _: EVERYONE_SILENT(inp, 5))
+    assert set(bench.output.faults) == {"F01-slow", "F24-hold", "F40-slow"}
+    assert bench.output.mode == Mode.HOLD
+
+
 def test_a_device_that_comes_back_in_that_tick_lets_the_run_go_on():
     bench = paused(30)
     bench.fold(lambda inp, _: EVERYONE_SILENT(inp, 31))
