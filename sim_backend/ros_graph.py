@@ -37,6 +37,8 @@ class Topic:
         self.listeners: dict[str, Callable[[Message], None]] = {}
         self.subscriptions: list[Subscription] = []
         self.latched: Message | None = None
+        self.bridge_sequence = 0
+        """How many messages the bridge has published here; ROS 1 writes it into their headers."""
 
     def publishers(self) -> list[str]:
         """Return the names of the nodes that publish."""
@@ -53,6 +55,7 @@ class RosGraph:
     def __init__(self, types: RosTypes) -> None:
         self.types = types
         self.topics: dict[str, Topic] = {}
+        self._spellings: set[str] = set()
 
     def resolve(self, name: str) -> str:
         """Return a topic's full name."""
@@ -64,7 +67,10 @@ class RosGraph:
         if canonical is None:
             return None
         topic = self.topics.setdefault(self.resolve(name), Topic(self.resolve(name), canonical))
-        return topic if topic.type_name == canonical else None
+        if topic.type_name != canonical:
+            return None
+        self._spellings.add(name)
+        return topic
 
     def provide(self, name: str, type_name: str, node: str = "") -> Topic:
         """Declare a topic of the robot itself, on which `node` publishes. Raises ConfigError when it cannot be."""
@@ -80,8 +86,8 @@ class RosGraph:
         return topic
 
     def find(self, name: str) -> Topic | None:
-        """Return a topic that exists."""
-        return self.topics.get(self.resolve(name))
+        """Return a topic by a name that needs no type: its full one, or another that came with a type before."""
+        return self.topics.get(self.resolve(name) if name in self._spellings else name)
 
     def wanted(self, name: str) -> bool:
         """Tell whether anybody listens."""

@@ -126,8 +126,10 @@ class RosTypes:
             return self.time(self._now())
         if not isinstance(value, dict):
             raise BadMessage(f"{path} needs a time")
-        whole = _whole(value.get("secs", value.get("sec", 0)), path)
-        return self.time((whole, _whole(value.get("nsecs", value.get("nanosec", 0)), path)))
+        whole, part = ("sec", "nanosec") if self._ros2 else ("secs", "nsecs")
+        if path.endswith("header.stamp") and not {whole, part} & value.keys():
+            return self.time(self._now())
+        return self.time((_whole(value.get(whole, 0), path), _whole(value.get(part, 0), path)))
 
     def _list(self, kind: str, value: object, path: str) -> list[Any]:
         element, _, length = kind[:-1].partition("[")

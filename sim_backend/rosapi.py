@@ -26,30 +26,30 @@ class RosApi:
         }
 
     def call(self, service: str, arguments: object) -> Answer:
-        """Call a service with an object of named arguments or a list in order; missing ones are empty."""
-        name = service if service.startswith("/") else f"/{service}"
+        """Call a service with an object of named arguments or a list in order; what is missing or neither is empty."""
+        name = self._graph.resolve(service)
         if name not in self._services:
-            return False, f"Service {service} does not exist"
+            return False, f"Service {name} does not exist"
         fields, function = self._services[name]
         if isinstance(arguments, list):
             arguments = dict(zip(fields, arguments, strict=False))
         if not isinstance(arguments, dict):
-            return False, f"{service}: arguments must be an object or a list"
+            arguments = {}
         wrong = [key for key, value in arguments.items() if key not in fields or not isinstance(value, str)]
         if wrong:
             return False, f"{service}: no such argument, or no string: {wrong[0]}"
         return True, function(*(arguments.get(field, "") for field in fields))
 
     def _topic_type(self, name: str) -> dict[str, Any]:
-        topic = self._graph.find(name)
+        topic = self._graph.topics.get(name)
         return {"type": topic.type_name if topic else ""}
 
     def _publishers(self, name: str) -> dict[str, Any]:
-        topic = self._graph.find(name)
+        topic = self._graph.topics.get(name)
         return {"publishers": topic.publishers() if topic else []}
 
     def _subscribers(self, name: str) -> dict[str, Any]:
-        topic = self._graph.find(name)
+        topic = self._graph.topics.get(name)
         return {"subscribers": topic.subscribers() if topic else []}
 
     def _topics(self) -> dict[str, Any]:

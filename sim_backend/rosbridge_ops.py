@@ -2,7 +2,9 @@
 
 What a client gets wrong is counted here and never answered. Parsing follows the real server: the whole buffer as
 JSON first, else the first object in it that parses; an object without `op` found that way is thrown away but
-its text stays in the buffer, so that a message cut short poisons the connection for good.
+its text stays in the buffer, so that a message cut short poisons the connection for good. JSON that breaks the
+server's own code (a bare number or boolean, an `op` that cannot be looked up) ends the thread that works for this
+client: what it sends later is never looked at, while its subscriptions go on.
 Not modelled: png and cbor compression (plain JSON is sent), outgoing fragments, authentication.
 Source: rosbridge protocol document, and the behaviour of rosbridge_suite 0.11.17.
 """
@@ -11,7 +13,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
@@ -116,8 +118,9 @@ class Session:
         self._escape = escape_slashes
         self._on_new_connection = on_new_connection
         self._buffer = ""
+        self._worker_died = False
         self._latches: dict[str, bool] = {}
-        self._subscriptions: dict[str, ClientSubscription] = {}
+        self._subscriptions: dict[str, tuple[Topic, ClientSubscription]] = {}
         self._fragments: dict[object, dict[int, str]] = {}
         self._operations: dict[object, Callable[[Message], None]] = {
             "advertise": self._advertise,
@@ -134,7 +137,7 @@ class Session:
         if len(self._buffer) < _MAX_BUFFER:  # a poisoned buffer never recovers; no need to let it grow
             self._buffer += text
         before = None
-        while self._buffer and self._buffer != before:
+        while self._buffer and self._buffer != before and not self._worker_died:
             before = self._buffer
             found, message = self._next_object()
             if found:
@@ -142,8 +145,8 @@ class Session:
 
     def close(self) -> None:
         """Forget the client: its subscriptions at once, its publishing after a while."""
-        for name, subscription in self._subscriptions.items():
-            self._drop_subscription(name, subscription)
+        for topic, subscription in self._subscriptions.values():
+            self._drop_subscription(topic, subscription)
         self._subscriptions.clear()
         for name in list(self._latches):
             self._withdraw(name)
@@ -172,12 +175,16 @@ class Session:
         return False, None
 
     def _perform(self, message: Any) -> None:
+        op = message.get("op") if isinstance(message, dict) else None
+        if isinstance(message, (int, float)) or isinstance(op, (dict, list)):
+            self._worker_died = True
+            self._counters["workers_died"] += 1
+            return
         try:
-            operation = self._operations.get(message.get("op")) if isinstance(message, dict) else None
-            if operation is None:
+            if op not in self._operations:
                 raise _Wrong("no such operation")
-            operation(message)
-        except (_Wrong, BadMessage, TypeError):  # TypeError: an op that cannot be a key
+            self._operations[op](message)
+        except (_Wrong, BadMessage):
             self._counters["ignored"] += 1
 
     def _advertise(self, request: Message) -> None:
@@ -199,39 +206,46 @@ class Session:
             raise _Wrong("cannot infer the topic's type")
         message = self._graph.types.filled(topic.type_name, request.get("msg", {}))
         topic.advertisers.add(self)
+        topic.bridge_sequence += 1
+        if "seq" in message.get("header", ()):  # whatever the client wrote there
+            message["header"]["seq"] = topic.bridge_sequence
         self._graph.publish(topic, message, latch=self._latches.setdefault(topic.name, False))
 
     def _subscribe(self, request: Message) -> None:
-        name, type_name = _text(request, "topic"), request.get("type")
-        throttle_ms, queue_length = _whole(request, "throttle_rate"), _whole(request, "queue_length")
-        topic = self._graph.find(name) if type_name is None else self._graph.declare(name, str(type_name))
+        name = _text(request, "topic")
+        _check_options(request, {"type": str, "compression": str})
+        _check_options(request, dict.fromkeys(("throttle_rate", "queue_length", "fragment_size"), int))
+        topic = self._graph.declare(name, request["type"]) if "type" in request else self._graph.find(name)
         if topic is None:
             raise _Wrong("unknown type, or another one than the topic's")
-        subscription = self._subscriptions.get(topic.name)
-        if subscription is None:
+        if name not in self._subscriptions:  # another spelling of the same topic is another subscription
             head = f'{{"op":"publish","topic":{json.dumps(name)},"msg":'
-            subscription = self._subscriptions[topic.name] = ClientSubscription(self._loop, self._send, head)
-            topic.subscriptions.append(subscription)
+            self._subscriptions[name] = topic, ClientSubscription(self._loop, self._send, head)
+            topic.subscriptions.append(self._subscriptions[name][1])
             self._on_new_connection(topic)
             if topic.latched is not None:
-                subscription.deliver(message_json(topic.latched))
-        subscription.add(request.get("id"), throttle_ms, queue_length)
+                self._subscriptions[name][1].deliver(message_json(topic.latched))
+        self._subscriptions[name][1].add(
+            request.get("id"), request.get("throttle_rate", 0), request.get("queue_length", 0)
+        )
 
     def _unsubscribe(self, request: Message) -> None:
-        name = self._graph.resolve(_text(request, "topic"))
-        subscription = self._subscriptions.get(name)
-        if subscription is not None and subscription.remove(request.get("id")):
-            self._drop_subscription(name, self._subscriptions.pop(name))
+        name = _text(request, "topic")
+        if name in self._subscriptions and self._subscriptions[name][1].remove(request.get("id")):
+            self._drop_subscription(*self._subscriptions.pop(name))
 
     def _call_service(self, request: Message) -> None:
         service = _text(request, "service")
+        _check_options(request, {"compression": str, "fragment_size": (int, type(None))})
+        name, _, old_id = service.partition("#")  # an old way to write the id
         if self._rosapi is None:
-            ok, values = False, f"Service {service} does not exist"
+            ok, values = False, f"Service {self._graph.resolve(name)} does not exist"
         else:
-            ok, values = self._rosapi.call(service, request.get("args", []))
+            ok, values = self._rosapi.call(name, request.get("args", []))
         answer = {"op": "service_response", "service": service, "values": values, "result": ok}
-        if request.get("id") is not None:
-            answer["id"] = request["id"]
+        call_id = request.get("id")
+        if call_id is not None or old_id:
+            answer["id"] = old_id if call_id is None else call_id
         self._send(json.dumps(answer, separators=(",", ":")))
 
     def _fragment(self, request: Message) -> None:
@@ -258,9 +272,9 @@ class Session:
 
         self._loop.call_at(monotonic_ns() + UNREGISTER_NS, unregister)
 
-    def _drop_subscription(self, name: str, subscription: ClientSubscription) -> None:
+    def _drop_subscription(self, topic: Topic, subscription: ClientSubscription) -> None:
         subscription.close()
-        self._graph.topics[name].subscriptions.remove(subscription)
+        topic.subscriptions.remove(subscription)
 
     def _send(self, text: str) -> None:
         self._raw_send(text.replace("/", "\\/") if self._escape else text)
@@ -273,8 +287,8 @@ def _text(request: Message, key: str) -> str:
     return value
 
 
-def _whole(request: Message, key: str) -> int:
-    value = request.get(key, 0)
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise _Wrong(f"{key} must be an int")
-    return value
+def _check_options(request: Message, kinds: Mapping[str, type | tuple[type, ...]]) -> None:
+    """Check fields that may be left out: there, but null, is wrong."""
+    for key, kind in kinds.items():
+        if key in request and not isinstance(request[key], kind):
+            raise _Wrong(f"{key} has the wrong type")
