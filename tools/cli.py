@@ -73,6 +73,11 @@ COMMANDS = {
         "show or check a rig with all its values",
         ("push config show emulated --set control.k_f=0.1", "push config check my-rig.toml"),
     ),
+    "bench sim": Command(
+        "tools.bench_sim",
+        "measure how much faster than real time level sim is",
+        ("push bench sim", "push bench sim --distance-m 2 --json"),
+    ),
     "bench physics": Command(
         "tools.bench_physics",
         "measure the slider's solvers",
