@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 import tempfile
@@ -13,9 +14,10 @@ SCHEMA = 1
 
 
 def tell(text: str) -> None:
-    """Print one line of people's text on stderr, if there is one."""
+    """Print one line of people's text on stderr, if there is one and it takes it (its terminal may be closed)."""
     if sys.stderr is not None:  # print(file=None) would go to stdout
-        print(text, file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):
+            print(text, file=sys.stderr, flush=True)
 
 
 def say_json(value: object) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
+import time
 from typing import Any
 
 import msgspec
@@ -26,6 +28,20 @@ class StatusPipe:
             line = b"\n" + line
         with contextlib.suppress(OSError):
             self._cut = os.write(self._fd, line) < len(line)
+
+    def say_whole(self, within_s: float, event: str, **facts: object) -> None:
+        """Send one line of any length, waiting up to `within_s` for a slow listener: for the last word of a process."""
+        line = msgspec.json.encode({"event": event, **facts}) + b"\n"
+        rest = b"\n" + line if self._cut else line
+        poll = select.poll()
+        poll.register(self._fd, select.POLLOUT)
+        deadline_s = time.monotonic() + within_s
+        with contextlib.suppress(OSError):
+            while rest and time.monotonic() < deadline_s:
+                poll.poll(100)
+                with contextlib.suppress(BlockingIOError):
+                    rest = rest[os.write(self._fd, rest) :]
+        self._cut = bool(rest)
 
     def error(self, error: PushError) -> None:
         """Send {"event": "error", "error": {code, what, where, do}}."""

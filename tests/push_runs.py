@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -78,12 +79,12 @@ class Run:
         """Return what it left in its folder for temporary files."""
         return sorted(path.name for path in self._files.iterdir() if path.name not in ("out", "err"))
 
-    def wait_for(self, text: str, within_s: float = 40.0) -> None:
-        """Wait until it has said `text` on stderr."""
+    def wait_for(self, pattern: str, within_s: float = 40.0) -> None:
+        """Wait until it has said something that matches `pattern` on stderr."""
         deadline_s = time.monotonic() + within_s
-        while text not in self.err:
-            assert self.process.poll() is None, f"it ended before it said {text!r}: {self.err}"
-            assert time.monotonic() < deadline_s, f"it did not say {text!r}: {self.err}"
+        while not re.search(pattern, self.err):
+            assert self.process.poll() is None, f"it ended before it said {pattern!r}: {self.err}"
+            assert time.monotonic() < deadline_s, f"it did not say {pattern!r}: {self.err}"
             time.sleep(0.01)
 
     def signal(self, number: int) -> None:

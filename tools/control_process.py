@@ -26,6 +26,8 @@ from tools.run_state import first_state, status_line
 from tools.tick_core import TickCore
 
 PRIORITY = 80
+VERDICT_WITHIN_S = 60.0
+"""The base stands already; this long a launcher that is held up (a stopped terminal) may take to listen again."""
 
 
 def main() -> int:
@@ -93,7 +95,8 @@ def _finish(loop: ControlLoop, sensor: Ft300, status: StatusPipe, rate_hz: float
     if loop.last is None:
         return 1
     figures = outcome(*loop.last)
-    status.say(
+    status.say_whole(
+        VERDICT_WITHIN_S,
         "finished",
         **figures,
         loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns),

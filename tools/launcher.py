@@ -174,7 +174,8 @@ class Launcher:
             self._children["control"].process.kill()
 
     def _resume(self) -> None:
-        self._processes.tell_control(b"R")
+        if self._began:  # before, anything but the word to go would end control
+            self._processes.tell_control(b"R")
 
     # --- end -------------------------------------------------------------------------------------------------
 
@@ -227,7 +228,7 @@ class Launcher:
         elif control.process.returncode < 0:
             code, how = SafetyStop.exit_code, control.how_it_ended()
         else:
-            code, how = PushError.exit_code, f"{control.how_it_ended()}, see {control.keep_words()}"
+            code, how = control.process.returncode, f"{control.how_it_ended()}, see {control.keep_words()}"
         stopped = f"the control process {how}; the gate stopped the base"
         try:
             figures = figures_of(self.log, self._rig.loop.rate_hz, code)

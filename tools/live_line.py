@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import select
 import sys
 import time
 from typing import Any
@@ -12,7 +13,7 @@ from safety.faults import FAULTS
 
 
 class LiveLine:
-    """Prints to stderr; never raises when nobody reads."""
+    """Prints to stderr; never waits and never raises when nobody reads."""
 
     def __init__(self, rig: RigConfig, *, quiet: bool = False) -> None:
         self._rig = rig
@@ -68,7 +69,17 @@ class LiveLine:
 
     def _write(self, text: str) -> None:
         try:
-            sys.stderr.write(text)
-            sys.stderr.flush()
+            if not self._would_block():
+                sys.stderr.write(text)
+                sys.stderr.flush()
         except (OSError, AttributeError, ValueError):
             return
+
+    def _would_block(self) -> bool:
+        """Tell whether nobody takes our lines now (a stopped terminal, a full pipe): then they are left out.
+
+        Whoever waits for the terminal cannot hear the operator.
+        """
+        poll = select.poll()
+        poll.register(sys.stderr.fileno(), select.POLLOUT)
+        return not poll.poll(0)

@@ -46,7 +46,9 @@ class OperatorKeys:
             os.close(fd)
         if self._terminal is not None:
             self._loop.remove_fd(self._stdin)
-            termios.tcsetattr(self._stdin, termios.TCSADRAIN, self._terminal)
+            with contextlib.suppress(termios.error):  # the terminal is closed
+                # NOW, not DRAIN: a stopped terminal would never have shown everything.
+                termios.tcsetattr(self._stdin, termios.TCSANOW, self._terminal)
             self._terminal = None
 
     def _on_signal(self, _events: int) -> None:
@@ -56,7 +58,10 @@ class OperatorKeys:
                     self._on_stop()
 
     def _on_key(self, _events: int) -> None:
-        key = os.read(self._stdin, 1)
+        try:
+            key = os.read(self._stdin, 1)
+        except OSError:  # the terminal is closed; SIGHUP says so too
+            key = b""
         if not key:
             self._loop.remove_fd(self._stdin)
         elif key in (b"r", b"R"):

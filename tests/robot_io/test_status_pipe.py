@@ -1,6 +1,8 @@
 """JSON lines from a child: whole, in order, and never in the speaker's way."""
 
 import os
+import select
+import time
 
 import pytest
 
@@ -62,6 +64,42 @@ def test_a_long_line_cut_by_a_full_pipe_does_not_take_the_next_one_with_it(ends)
     assert [event["text"][0] for event in listener.read()] == ["a"]
     speaker.say("finished", exit_code=5)
     assert listener.read() == [{"event": "finished", "exit_code": 5}]
+
+
+def test_the_last_word_waits_for_a_listener_that_was_held_up(ends):
+    read_fd, write_fd = ends[1].fd, ends[2]
+    speaker = StatusPipe(write_fd)
+    while _fits(write_fd):
+        speaker.say("status", text="x" * 500)
+    pid = os.fork()
+    if pid == 0:  # a listener that comes late: everything in the pipe and the whole last word, 200 KB, or code 1
+        late = StatusReader(read_fd)
+        time.sleep(0.2)
+        deadline_s = time.monotonic() + 10.0
+        while time.monotonic() < deadline_s:
+            if any(event["event"] == "finished" and len(event["text"]) == 200_000 for event in late.read()):
+                os._exit(0)
+            time.sleep(0.01)
+        os._exit(1)
+    speaker.say_whole(10.0, "finished", text="y" * 200_000)
+    assert os.waitpid(pid, 0)[1] == 0
+
+
+def test_the_last_word_is_given_up_when_nobody_listens(ends):
+    speaker, listener, _ = ends
+    began_s = time.monotonic()
+    speaker.say_whole(0.2, "finished", text="y" * 200_000)
+    assert 0.2 <= time.monotonic() - began_s < 5.0
+    assert listener.read() == []
+    listener.close()
+    speaker.say_whole(5.0, "finished")
+    assert time.monotonic() - began_s < 5.0
+
+
+def _fits(fd):
+    poll = select.poll()
+    poll.register(fd, select.POLLOUT)
+    return bool(poll.poll(0))
 
 
 def test_a_closed_pipe_is_no_error_for_the_speaker(ends):

@@ -1,49 +1,105 @@
-"""The line an operator sees, also before anything is known."""
+"""The live line: rewritten on a terminal, once a second elsewhere, faults in words, and never in the way."""
 
 from __future__ import annotations
 
-import io
+import contextlib
+import os
+import pty
+import time
 
+from robot_io.config import load_rig
+from safety.faults import FAULTS
 from tools.live_line import LiveLine
-from tools.rig import resolve_rig
 
 STATUS = {
+    "tick": 100,
     "phase": "PUSH",
     "mode": "PUSHING",
-    "progress_m": 1.25,
-    "lateral_m": -0.02,
-    "force_N": [14.0, 3.0, 0.1],
+    "progress_m": 0.5,
+    "lateral_m": -0.012,
+    "force_N": [12.0, 5.0, 0.0],
     "theta_p": 0.1,
     "speed": 0.1,
     "faults": [],
+    "late_ms": 0.1,
 }
 
 
-def shown(monkeypatch, *statuses):
-    stream = io.StringIO()
-    monkeypatch.setattr("sys.stderr", stream)
-    live = LiveLine(resolve_rig("sim"))
-    for status in statuses:
-        live.show(status)
-    return stream.getvalue()
+@contextlib.contextmanager
+def stderr_is_a_pipe():
+    """Give the end to read from. Not a fixture: pytest sets stderr anew for the test itself."""
+    read_fd, write_fd = os.pipe()
+    os.set_blocking(read_fd, False)
+    with os.fdopen(write_fd, "w") as stderr, contextlib.redirect_stderr(stderr):
+        yield read_fd
+    os.close(read_fd)
 
 
-def test_figures_of_a_push(monkeypatch):
-    line = shown(monkeypatch, STATUS)
-    assert "PUSH" in line
-    assert "1.25/2.00 m" in line
-    assert "-0.020 m" in line
-    assert "14.3/150 N" in line
+def test_one_line_a_second_where_it_is_no_terminal():
+    with stderr_is_a_pipe() as to_pipe:
+        live = LiveLine(load_rig("emulated"))
+        for _ in range(5):
+            live.show(STATUS)
+        lines = os.read(to_pipe, 65536).decode().splitlines()
+        assert len(lines) == 1
+        assert "PUSH" in lines[0]
+        assert "0.50/2.00 m" in lines[0]
+        assert "13.0/150 N" in lines[0]
 
 
-def test_what_is_not_known_yet_is_no_error(monkeypatch):
-    """Before the first pose the position is NaN, which JSON carries as null."""
-    line = shown(monkeypatch, {**STATUS, "phase": "SETTLE", "progress_m": None, "lateral_m": None})
-    assert "SETTLE" in line
-    assert "nan" in line
+def test_a_fault_is_said_in_words_once():
+    with stderr_is_a_pipe() as to_pipe:
+        live = LiveLine(load_rig("emulated"), quiet=True)
+        for _ in range(3):
+            live.show({**STATUS, "faults": ["F01-slow"], "mode": "SLOW"})
+        assert os.read(to_pipe, 65536).decode() == f"F01-slow {FAULTS['F01-slow'].text} -> SLOW\n"
 
 
-def test_a_fault_is_a_line_of_its_own_in_words_and_said_once(monkeypatch):
-    faulty = {**STATUS, "faults": ["F50-slow"], "mode": "SLOW"}
-    text = shown(monkeypatch, STATUS, faulty, faulty)
-    assert text.count("F50-slow the force is above the slow limit -> SLOW\n") == 1
+def test_a_full_pipe_holds_nobody_up():
+    with stderr_is_a_pipe() as to_pipe:
+        live = LiveLine(load_rig("emulated"))
+        began_s = time.monotonic()
+        for n in range(2000):
+            live.say(f"{n} {'x' * 100}")
+        assert time.monotonic() - began_s < 5.0
+        said = b""
+        while True:
+            try:
+                said += os.read(to_pipe, 65536)
+            except BlockingIOError:
+                break
+        lines = said.decode().splitlines()
+        assert [int(line.split()[0]) for line in lines] == list(range(len(lines))), "the first ones, whole"
+        assert 100 < len(lines) < 2000
+        live.say("again")
+        assert os.read(to_pipe, 65536) == b"again\n"
+
+
+def test_a_stopped_terminal_holds_nobody_up():
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "w") as stderr, contextlib.redirect_stderr(stderr):
+        live = LiveLine(load_rig("emulated"))
+        live.show(STATUS)
+        assert os.read(ours, 65536).startswith(b"\r")
+        os.write(ours, b"\x13")  # Ctrl-S
+        for _ in range(1000):
+            live.show(STATUS)  # returns
+        os.write(ours, b"\x11")  # Ctrl-Q
+        live.end()
+    os.close(ours)
+
+
+def test_a_closed_terminal_and_none_at_all():
+    ours, theirs = pty.openpty()
+    stderr = os.fdopen(theirs, "w")
+    with contextlib.redirect_stderr(stderr):
+        live = LiveLine(load_rig("emulated"))
+        os.close(ours)
+        live.show(STATUS)
+        live.end()
+    with contextlib.suppress(OSError):
+        stderr.close()  # it could not write either
+    with contextlib.redirect_stderr(None):
+        none = LiveLine(load_rig("emulated"))
+        none.show({**STATUS, "faults": ["F02"]})
+        none.end()

@@ -100,6 +100,11 @@ def mixed(tmp_path, table, *lines):
     return str(rig)
 
 
+def device_fails(state, tmp_path, code, rig):
+    """Run a rig whose real device fails at the start."""
+    return push_fails(state, tmp_path, code, rig, "--move-robot", also_plain=False)
+
+
 def closed_address():
     """Return a loopback address and port at which nothing listens."""
     with socket.create_server((fresh_address(), 0)) as server:
@@ -150,7 +155,7 @@ def test_wrong_topic_type(state, tmp_path):
             "[base.topics]",
             'command_type = "geometry_msgs/TwistStamped"',
         )
-        error = push_fails(state, tmp_path, 4, rig, "--move-robot", also_plain=False)
+        error = device_fails(state, tmp_path, 4, rig)
         assert "/cmd_vel carries geometry_msgs/Twist" in error["what"]
         assert "TwistStamped" in error["what"]
         assert "base.topics" in error["do"]
@@ -158,7 +163,7 @@ def test_wrong_topic_type(state, tmp_path):
 
 @pytest.mark.parametrize("url", ["ws://", "ws://127.0.0.1:nine"])
 def test_an_address_that_is_no_bridge(state, tmp_path, url):
-    error = push_fails(state, tmp_path, 2, mixed(tmp_path, "base", f'url = "{url}"'), "--move-robot", also_plain=False)
+    error = device_fails(state, tmp_path, 2, mixed(tmp_path, "base", f'url = "{url}"'))
     assert url in f"{error['where']} {error['what']}"
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import os
 import pty
 import signal
 import subprocess
+import termios
 import time
 
 import pytest
@@ -226,30 +228,84 @@ def test_a_barrel_is_pushed_with_stdin_closed(state, tmp_path):
     assert summary["distance_m"] >= 0.15
 
 
-def test_on_a_terminal_any_key_stops(state, tmp_path):
-    """stdin and stderr are a terminal: a live line, and a clean stop by a key; the terminal is left as it was."""
-    import termios
+class Terminal:
+    """Our end of a terminal, read without waiting."""
 
-    ours, theirs = pty.openpty()
-    argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
-    before = termios.tcgetattr(theirs)
-    with started(state, *argv, stdin=theirs, stderr=theirs) as run:
-        shown = b""
-        deadline_s = time.monotonic() + 40.0
-        os.set_blocking(ours, False)
-        while b"PUSH " not in shown:
-            assert time.monotonic() < deadline_s, shown
+    def __init__(self):
+        self.fd, self.theirs = pty.openpty()
+        os.set_blocking(self.fd, False)
+        self.shown = b""
+
+    def wait_for(self, text, within_s=40.0):
+        deadline_s = time.monotonic() + within_s
+        while text not in self.shown:
+            assert time.monotonic() < deadline_s, self.shown
             try:
-                shown += os.read(ours, 65536)
+                self.shown += os.read(self.fd, 65536)
             except BlockingIOError:
                 time.sleep(0.01)
-        assert b"\r" in shown
-        os.write(ours, b" ")
+
+    def close(self):
+        os.close(self.fd)
+        os.close(self.theirs)
+
+
+def test_on_a_terminal_any_key_stops(state, tmp_path):
+    """stdin and stderr are a terminal: a live line, a clean stop by a key, and the terminal is left as it was."""
+    terminal = Terminal()
+    out = tmp_path / "run"
+    before = termios.tcgetattr(terminal.theirs)
+    argv = ("run", "emulated", *QUICK, "--out", str(out), "--json")
+    with started(state, *argv, stdin=terminal.theirs, stderr=terminal.theirs) as run:
+        wait_until((out / "processes.json").exists, "the processes", 40.0)
+        os.write(terminal.fd, b"r")  # resume means nothing yet, and harms nothing
+        terminal.wait_for(b"PUSH ")
+        assert b"\r" in terminal.shown
+        os.write(terminal.fd, b" ")
         assert run.process.wait(20.0) == 130
         run.wait_gone(3.0)
-    assert termios.tcgetattr(theirs) == before
-    os.close(ours)
-    os.close(theirs)
+    assert termios.tcgetattr(terminal.theirs) == before
+    terminal.close()
+
+
+def test_a_closed_terminal_is_a_clean_stop(state, tmp_path):
+    """The window is closed, or the connection of a remote login breaks: SIGHUP, and nobody to write to."""
+    terminal = Terminal()
+    out = tmp_path / "run"
+    argv = ("run", "emulated", *QUICK, "--out", str(out), "--json")
+    with started(state, *argv, stdin=terminal.theirs, stderr=terminal.theirs) as run:
+        terminal.wait_for(b"PUSH ")
+        terminal.close()
+        assert_clean_stop(run, out, signal.SIGHUP)
+
+
+def test_a_reader_that_stopped_reading_does_not_hold_up_the_stop(state, tmp_path):
+    """`push run 2>&1 | less`: nobody reads on, the pipe is full, and a stop must get through all the same."""
+    read_fd, write_fd = os.pipe()
+    argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
+    with started(state, *argv, stderr=write_fd) as run:
+        shown = b""
+        while b"PUSH " not in shown:
+            shown += os.read(read_fd, 65536)
+        os.set_blocking(write_fd, False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(write_fd, b"x" * 4096)
+        os.set_blocking(write_fd, True)
+        control = json.loads((tmp_path / "run" / "processes.json").read_text())["control"]
+        run.signal(signal.SIGTERM)
+        wait_until(lambda: control not in run.alive(), "control ends", 10.0)
+        os.set_blocking(read_fd, False)
+
+        def ended():
+            with contextlib.suppress(BlockingIOError):
+                os.read(read_fd, 65536)
+            return run.process.poll() is not None
+
+        wait_until(ended, "the run ends", 20.0)
+        assert_clean_stop(run, tmp_path / "run")
+    os.close(read_fd)
+    os.close(write_fd)
 
 
 def test_dry_run_opens_nothing(state, tmp_path):

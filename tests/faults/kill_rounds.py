@@ -1,0 +1,116 @@
+"""One process of a pushing run killed or frozen: when the base was told zero, when its wheels stood, what stayed.
+
+All times are CLOCK_MONOTONIC: the signal's here, a command's arrival and the wheels' in the log of the emulated world.
+A round in which the host did not let the gate or the emulators run for 10 ms in all (the kernel's own count of time
+spent waiting for a processor), or took processor time away from this machine, says nothing and is repeated.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tests.push_runs import QUICK, Ended, Run, stands, started, world_of
+
+PUSHING = r"PUSH .* v 0\.10 m/s"
+STALL_MS = 10.0
+ROUNDS = 3
+WATCHED = ("gate", "emulators")
+
+
+class Round(NamedTuple):
+    """What came of a kill; times in ms after it, None where it never came."""
+
+    ended: Ended
+    folder: Path
+    zero_ms: float | None
+    rest_ms: float | None
+    stall_ms: float
+    gone_ms: float
+    last_state_ms: float
+
+
+@contextlib.contextmanager
+def pushing(state: Path, folder: Path, *more: str, **popen: Any) -> Iterator[tuple[Run, dict[str, int]]]:
+    """Give a run in the middle of its push at 0.1 m/s, and its processes by name."""
+    argv = ("run", "emulated", "--distance-m", "5", *QUICK, *more, "--out", str(folder), "--json")
+    with started(state, *argv, **popen) as run:
+        run.wait_for(PUSHING)
+        yield run, json.loads((folder / "processes.json").read_text())
+
+
+def strike(state: Path, folder: Path, name: str, number: signal.Signals, *, log: str = "run.mcap") -> Round:
+    """Send a signal to one process of a pushing run, wait for the end of everything, and read its log."""
+    with pushing(state, folder) as (run, pids):
+        before = _waited_ms(pids)
+        at_ns = time.monotonic_ns()
+        os.kill(pids[name], number)
+        time.sleep(0.12)
+        stall_ms = max(after - before[who] for who, after in _waited_ms(pids).items())
+        ended = run.wait(20.0)
+        run.wait_gone(3.0)
+        gone_ms = (time.monotonic_ns() - at_ns) / 1e6
+    if not (folder / log).exists():
+        return Round(ended, folder, None, None, stall_ms, gone_ms, 0.0)
+    commands, wheels = world_of(folder / log)
+    moving = [twist for t_ns, twist in wheels if t_ns <= at_ns]
+    assert moving, "the base was not yet there"
+    assert not stands(moving[-1]), "it was to be killed while the base moves"
+    zero = next((t_ns for t_ns, twist in commands if t_ns >= at_ns and stands(twist)), None)
+    rest = next((t_ns for t_ns, twist in wheels if t_ns >= at_ns and stands(twist)), None)
+    return Round(
+        ended,
+        folder,
+        None if zero is None else (zero - at_ns) / 1e6,
+        None if rest is None else (rest - at_ns) / 1e6,
+        stall_ms,
+        gone_ms,
+        (wheels[-1][0] - at_ns) / 1e6,
+    )
+
+
+def within(
+    state: Path, tmp_path: Path, name: str, number: signal.Signals, *, zero_ms: float | None, rest_ms: float
+) -> Round:
+    """Strike until a round keeps its bounds; only one that the host stalled is repeated, three times at most.
+
+    zero_ms: the zero command's bound (None: none can come). rest_ms: the wheels' bound after it, or after the
+    signal where no command comes.
+    """
+    for attempt in range(1 + ROUNDS):
+        found = strike(state, tmp_path / f"run{attempt}", name, number)
+        told = f"{number.name} of {name}, round {attempt + 1}: zero {_ms(found.zero_ms)}, wheels at rest "
+        told += f"{_ms(found.rest_ms)}, all gone {found.gone_ms:.0f} ms, host held back {found.stall_ms:.1f} ms"
+        print(told)
+        if _kept(found, zero_ms, rest_ms):
+            return found
+        assert found.stall_ms > STALL_MS, f"{told}; bounds: {_ms(zero_ms)}, then {_ms(rest_ms)}"
+        print("  repeated: the host stalled")
+    raise AssertionError(f"the host stalled in each of {1 + ROUNDS} rounds")
+
+
+def _kept(found: Round, zero_ms: float | None, rest_ms: float) -> bool:
+    if found.rest_ms is None:
+        return False
+    if zero_ms is None:
+        return found.rest_ms <= rest_ms
+    return found.zero_ms is not None and found.zero_ms <= zero_ms and found.rest_ms <= found.zero_ms + rest_ms
+
+
+def _waited_ms(pids: dict[str, int]) -> dict[str, float]:
+    """Return how long each watched process, and the machine itself, has waited for a processor so far."""
+    waited = {"machine": float(Path("/proc/stat").read_text().split()[8]) * 1000.0 / os.sysconf("SC_CLK_TCK")}
+    for name in WATCHED:
+        with contextlib.suppress(OSError):  # the one that was killed
+            waited[name] = int(Path(f"/proc/{pids[name]}/schedstat").read_text().split()[1]) / 1e6
+    return waited
+
+
+def _ms(value: float | None) -> str:
+    return "never" if value is None else f"{value:.1f} ms"

@@ -1,0 +1,185 @@
+"""Any process of a run killed in the middle of a push: the base stands in time, the log is whole, nothing stays.
+
+`pytest -s` prints what was measured.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from robot_io.log_messages import SAFETY_EVENT
+from robot_io.tick import TICK_CDR
+from safety.faults import FAULTS
+from tests.faults.kill_rounds import Round, pushing, strike, within
+from tests.push_runs import PUSH, ROOT, messages, stands, world_of
+
+KILL, STOP = signal.SIGKILL, signal.SIGSTOP
+ZERO_MS = 20.0
+FROZEN_ZERO_MS = 70.0
+REST_MS = 60.0
+"""One tick of the base (40 ms), and braking from 0.1 m/s at 2.5 m/s^2, which fits into the next one."""
+GATE_GONE_REST_MS = 330.0
+"""The base's own timeout of 0.25 s and its tick, 29 ticks of 10 ms, and 4 more per 0.1 m/s."""
+ARM_GONE_ZERO_MS = 30.0
+"""One tick, and two on the wire."""
+REPEATS = 8
+
+
+@pytest.fixture(scope="module")
+def state(tmp_path_factory):
+    return tmp_path_factory.mktemp("state")
+
+
+def replays(folder: Path) -> None:
+    """Check that the log is whole and folds to itself."""
+    done = subprocess.run(
+        [*PUSH, "replay", str(folder), "--json"], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads(done.stdout)
+    assert result["ticks"] == result["identical"] > 100
+    assert result["world"]["states"] == result["world"]["identical"] > 100
+
+
+def logged_faults(found: Round) -> list[str]:
+    """Return the named faults of a log, in order."""
+    events = [SAFETY_EVENT.decode(message.payload) for message in messages(found.folder / "run.mcap", "/safety/event")]
+    return [event.fault for event in events if event.kind == "fault"]
+
+
+def check_dead_control(found: Round, fault: str) -> None:
+    """Check everything that does not depend on who died."""
+    assert fault in logged_faults(found)
+    assert found.last_state_ms > found.rest_ms, "the log goes on until the wheels stand"
+    replays(found.folder)
+
+
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
+def test_control_killed(state, tmp_path, again):
+    found = within(state, tmp_path, "control", KILL, zero_ms=ZERO_MS, rest_ms=REST_MS)
+    check_dead_control(found, "F65")
+    assert found.ended.code == 5, found.ended.err
+    summary = found.ended.last_object
+    assert summary["verdict"] == "safety stop"
+    assert summary["faults"] == ["F65"]
+    assert summary["distance_m"] > 0.0
+    assert summary["devices"]["ft300"]["packets_ok"] > 100
+    assert [note for note in summary["notes"] if "SIGKILL" in note]
+    assert FAULTS["F65"].text in found.ended.err
+    assert json.loads((found.folder / "summary.json").read_text()) == summary
+
+
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
+def test_launcher_killed(state, tmp_path, again):
+    found = within(state, tmp_path, "launcher", KILL, zero_ms=ZERO_MS, rest_ms=REST_MS)
+    check_dead_control(found, "F65")
+    assert found.ended.code == -KILL
+
+
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
+def test_control_frozen(state, tmp_path, again):
+    found = within(state, tmp_path, "control", STOP, zero_ms=FROZEN_ZERO_MS, rest_ms=REST_MS)
+    check_dead_control(found, "F66")
+    assert found.ended.code == 5, found.ended.err
+    assert found.ended.last_object["faults"] == ["F66"]
+    assert FAULTS["F66"].text in found.ended.err
+
+
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
+def test_gate_killed_and_the_base_stops_by_its_own_timeout(state, tmp_path, again):
+    found = within(state, tmp_path, "gate", KILL, zero_ms=None, rest_ms=GATE_GONE_REST_MS)
+    assert found.zero_ms is None, "nobody else holds the base's connection"
+    assert "F67" in logged_faults(found)
+    assert found.ended.code == 5, found.ended.err
+    assert found.ended.last_object["faults"][0] == "F67"
+    replays(found.folder)
+
+
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
+def test_arm_killed(state, tmp_path, again):
+    found = within(state, tmp_path, "arm", KILL, zero_ms=ARM_GONE_ZERO_MS, rest_ms=REST_MS)
+    assert "F69" in logged_faults(found)
+    assert found.ended.code == 5, found.ended.err
+    assert found.ended.last_object["faults"][0] == "F69"
+    replays(found.folder)
+
+
+@pytest.mark.long
+def test_arm_frozen(state, tmp_path):
+    found = strike(state, tmp_path / "run", "arm", STOP)
+    assert "F24-hold" in logged_faults(found)
+    assert found.ended.code == 5, found.ended.err
+    replays(found.folder)
+
+
+def test_recorder_killed(state, tmp_path):
+    """Nobody is in danger: the push goes on for a second, then the base holds; what was flushed can be recovered."""
+    found = strike(state, tmp_path / "run", "recorder", KILL, log="recovered.mcap")
+    assert found.ended.code == 5, found.ended.err
+    summary = found.ended.last_object
+    assert summary["faults"] == ["F63"]
+    assert FAULTS["F63"].text in found.ended.err
+    assert [note for note in summary["notes"] if "not complete" in note]
+    assert 1000.0 < found.gone_ms < 6000.0
+    log = found.folder / "run.mcap"
+    recovered = [*PUSH, "log", "recover", str(log), "--out", str(tmp_path / "recovered.mcap")]
+    done = subprocess.run(recovered, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    ticks = [TICK_CDR.decode(message.payload) for message in messages(tmp_path / "recovered.mcap", "/control/tick")]
+    assert len(ticks) > 100, "a quarter of a second is lost at most"
+
+
+@pytest.mark.long
+def test_all_devices_gone_at_once(state, tmp_path):
+    """The emulators killed: every device is lost, as when the robot is switched off."""
+    found = strike(state, tmp_path / "run", "emulators", KILL)
+    assert found.ended.code == 5, found.ended.err
+    faults = set(found.ended.last_object["faults"])
+    assert faults & {"F30", "F02", "F24-stop", "F69"}
+    assert [note for note in found.ended.last_object["notes"] if "emulators" in note]
+
+
+BROKEN_FOLD = """
+import sys
+if "tools.control_process" in sys.orig_argv:
+    from tools.tick_core import TickCore
+    fold = TickCore.fold
+    def broken(self, state, inp):
+        if state.control.progress_m > 0.1 and not inp.host.loop_error:
+            raise ArithmeticError("planted by a test")
+        return fold(self, state, inp)
+    TickCore.fold = broken
+"""
+
+
+def test_an_exception_in_the_loop(state, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(BROKEN_FOLD)
+    with pushing(state, tmp_path / "run", env={"PYTHONPATH": str(tmp_path)}) as (run, _):
+        ended = run.wait(20.0)
+        run.wait_gone(3.0)
+        assert ended.code == 1, ended.err
+        summary = ended.last_object
+        assert summary["faults"] == ["F68"]
+        assert 0.1 < summary["distance_m"] < 0.2
+        [note] = [note for note in summary["notes"] if "ArithmeticError: planted by a test" in note]
+        assert "Traceback" not in ended.err
+        traceback = Path(note.rpartition(" ")[2]).read_text()
+        assert 'raise ArithmeticError("planted by a test")' in traceback
+    log = tmp_path / "run" / "run.mcap"
+    last = TICK_CDR.decode(messages(log, "/control/tick")[-1].payload)
+    assert (last.output.faults, last.output.exit_code, last.output.finished) == (("F68",), 1, True)
+    events = [SAFETY_EVENT.decode(message.payload) for message in messages(log, "/safety/event")]
+    assert "F68" in [event.fault for event in events]
+    assert "F65" not in [event.fault for event in events], "the zero came first"
+    commands, wheels = world_of(log)
+    failed_ns = last.input.now_ns
+    zero_ns = next(t_ns for t_ns, twist in commands if t_ns >= failed_ns and stands(twist))
+    print(f"exception: zero {(zero_ns - failed_ns) / 1e6:.1f} ms after its tick")
+    assert (zero_ns - failed_ns) / 1e6 < ZERO_MS
+    assert stands(wheels[-1][1])
+    replays(tmp_path / "run")
