@@ -25,7 +25,7 @@ from robot_io.config import TopicsConfig
 from robot_io.driver import DriverBase
 from robot_io.errors import ConfigError, DeviceNotReady, DeviceUnreachable
 from robot_io.messages import BodyTwist, DeviceHealth, DeviceInfo, LinkState, Pose2D, Stamped
-from robot_io.ridgeback_feeds import FeedReader, feed_types
+from robot_io.ridgeback_feeds import FeedReader, feed_types, with_full_names
 from robot_io.ridgeback_preflight import check_topics
 from robot_io.rosbridge_codec import (
     Published,
@@ -74,6 +74,7 @@ class Ridgeback(DriverBase):
         self.url = url
         self.before_close = before_close
         self._clock = clock
+        topics = with_full_names(topics)
         self._topic = topics.command
         self._type = spell_type(topics.command_type, topics.ros_version)
         if not self._topic:

@@ -7,6 +7,8 @@ from odometry count from where the base stood at the first message.
 
 from __future__ import annotations
 
+import msgspec
+
 from robot_io.base_feed import BaseFeed, BaseOdometry, BasePose, BaseReport, CommandEcho, SliderPose
 from robot_io.config import TopicsConfig
 from robot_io.errors import ConfigError
@@ -23,6 +25,13 @@ from robot_io.rosbridge_messages import (
 )
 
 _NAN = float("nan")
+
+
+def with_full_names(topics: TopicsConfig) -> TopicsConfig:
+    """Return the same topics with every name beginning with a slash: rosapi compares names as they are written."""
+    names = ("command", "odometry", "base_pose", "joint_states", "status", "slider_pose")
+    written = {name: getattr(topics, name) for name in names}
+    return msgspec.structs.replace(topics, **{name: f"/{text.lstrip('/')}" for name, text in written.items() if text})
 
 
 def feed_types(topics: TopicsConfig, pose_source: str) -> dict[str, str]:

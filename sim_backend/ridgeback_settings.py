@@ -30,6 +30,15 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
         """Topic of the object's pose; motion capture sees it whether or not the rig logs it."""
         return self.topics.slider_pose or DEFAULT_SLIDER_TOPIC
 
+    def resolved(self) -> RidgebackSettings:
+        """Return the same with every topic as the robot knows it, from the root on."""
+        names = {
+            field: value if value.startswith("/") else f"/{value}"
+            for field, value in msgspec.structs.asdict(self.topics).items()
+            if isinstance(value, str) and value and not field.endswith(("_type", "_frame"))
+        }
+        return msgspec.structs.replace(self, topics=msgspec.structs.replace(self.topics, **names))
+
 
 class BridgeSettings(msgspec.Struct, frozen=True):
     """Habits of the emulated bridge process."""

@@ -44,6 +44,7 @@ class RosbridgeEmulator:
         bridge: BridgeSettings = BridgeSettings(),  # noqa: B008 - frozen
     ) -> None:
         self._loop = loop
+        settings = settings.resolved()
         self._bridge = bridge
         self._clock_offset_ns = wall_offset_ns() + round(bridge.clock_skew_s * NS_PER_S)
         self._counters: Counter[str] = Counter()

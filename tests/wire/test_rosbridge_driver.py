@@ -47,10 +47,32 @@ def gather_until(base: Ridgeback, wanted: type, twist: BodyTwist | None = None) 
     return found[-1]
 
 
+RELATIVE = TopicsConfig(
+    command="cmd_vel",
+    odometry="odometry/filtered",
+    base_pose="vicon/ThingBase_4/ThingBase_4",
+    status="",
+)
+
+
 @pytest.fixture(scope="module")
 def bridge():
     with running_bridge(topics=TOPICS) as running:
         yield running
+
+
+def test_names_without_the_first_slash_are_the_same_topics(bridge: Bridge):
+    """A real rosapi finds no listener of `cmd_vel`: it compares names as they are written."""
+    with Ridgeback(bridge.url, topics=RELATIVE) as base:
+        assert base.health().counters["unanswered_checks"] == 0
+        gather_until(base, CommandEcho, BodyTwist())
+
+
+def test_an_emulated_base_may_be_described_by_such_names_too():
+    with running_bridge(topics=RELATIVE) as bridge, Ridgeback(bridge.url, topics=QUICK) as base:
+        gather_until(base, BasePose)
+        gather_until(base, BaseOdometry)
+        gather_until(base, CommandEcho, BodyTwist())
 
 
 def test_commands_move_the_base_and_every_feed_arrives(bridge: Bridge):
