@@ -131,10 +131,10 @@ def hammered(payload_size: int, enough: int) -> None:
 
 @pytest.mark.parametrize("payload_size", [8, 304, 4096])
 def test_two_processes_and_no_torn_record(payload_size):
-    hammered(payload_size, 50_000)
+    hammered(payload_size, 20_000)
 
 
 @pytest.mark.long
 @pytest.mark.timeout(200)
 def test_two_processes_and_no_torn_record_for_longer():
-    hammered(304, 2_000_000)
+    hammered(304, 1_000_000)
