@@ -10,10 +10,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from functools import lru_cache
-from operator import attrgetter
 from typing import Any
 
-from robot_io.cdr_packer import packer_of
+from robot_io.cdr_packer import Build, Packed, Write, Written, writer_of
 from robot_io.cdr_shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text, builder, leaves
 
 HEADER_BYTES = 4
@@ -47,19 +46,25 @@ class Layout:
         if run:
             self._parts.append(_Run(run))
         self.min_bytes = sum(part.min_bytes for part in self._parts)
-        self._build = builder(shape)
+        self._shape = shape
+        # Compiled at their first use: most types of a run are never read, most of a log never written.
+        self._build: Build | None = None
+        self._write: Write | None = None
 
     def write(self, value: Any, out: bytearray) -> None:
         """Append `value` to `out`, which starts with the encapsulation header."""
-        for part in self._parts:
-            part.write(value, out)
+        if self._write is None:
+            self._write = writer_of([part.writing() for part in self._parts], HEADER_BYTES)
+        self._write(value, out)
 
     def read(self, payload: bytes, at: int) -> tuple[Any, int]:
         """Return the Struct found at `at` and where it ends. Raises NotThisType, struct.error or ValueError."""
+        if self._build is None:
+            self._build = builder(self._shape)
         found: list[Any] = []
         for part in self._parts:
             at = part.read(payload, at, found)
-        return self._build(iter(found)), at
+        return self._build(found), at
 
 
 class _Part:
@@ -67,8 +72,8 @@ class _Part:
 
     min_bytes: int
 
-    def write(self, owner: Any, out: bytearray) -> None:
-        """Append the fields of `owner` to `out`."""
+    def writing(self) -> Packed | Written:
+        """Return how it is written."""
         raise NotImplementedError
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
@@ -81,10 +86,6 @@ class _Run(_Part):
 
     def __init__(self, items: list[tuple[str, Scalar, int | None]]) -> None:
         self._paths = [(path, count) for path, _, count in items]
-        self._pack: Callable[[Any, Callable[..., bytes]], bytes] | None = None
-        self._counts = [count for _, _, count in items]
-        self._enums = [scalar.enum for _, scalar, _ in items]
-        self._plain = not any(self._counts) and not any(self._enums)
         self._packers = [struct.Struct(_format(items, start)) for start in range(8)]
         # Only these bytes can differ from what would be written again: padding, and bools.
         self._loose = [
@@ -92,10 +93,8 @@ class _Run(_Part):
         ]
         self.min_bytes = sum(PRIMITIVES[scalar.ros][1] * (count or 1) for _, scalar, count in items)
 
-    def write(self, owner: Any, out: bytearray) -> None:
-        if self._pack is None:  # at the first use: most types of a log are only ever read
-            self._pack = packer_of(self._paths)
-        out += self._pack(owner, self._packers[(len(out) - HEADER_BYTES) & 7].pack)
+    def writing(self) -> Packed:
+        return Packed(self._paths, [packer.pack for packer in self._packers])
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         offset = (at - HEADER_BYTES) & 7
@@ -106,16 +105,7 @@ class _Run(_Part):
         end = at + packer.size
         if self._loose[offset] and packer.pack(*values) != payload[at:end]:
             raise NotThisType("a bool that is neither 0 nor 1, or padding that is not zero")
-        if self._plain:
-            found.extend(values)
-            return end
-        i = 0
-        for count, enum in zip(self._counts, self._enums, strict=True):
-            taken = values[i : i + (count or 1)]
-            i += count or 1
-            if enum is not None:
-                taken = tuple(enum(value) for value in taken)
-            found.append(taken[0] if count is None else taken)
+        found.extend(values)
         return end
 
 
@@ -125,10 +115,10 @@ class _Text(_Part):
     min_bytes = 5
 
     def __init__(self, path: str) -> None:
-        self._get = attrgetter(path)
+        self._path = path
 
-    def write(self, owner: Any, out: bytearray) -> None:
-        _write_text(self._get(owner), out)
+    def writing(self) -> Written:
+        return Written(self._path, _write_text)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         text, at = _read_text(payload, at)
@@ -142,12 +132,10 @@ class _Blob(_Part):
     min_bytes = 4
 
     def __init__(self, path: str) -> None:
-        self._get = attrgetter(path)
+        self._path = path
 
-    def write(self, owner: Any, out: bytearray) -> None:
-        value = self._get(owner)
-        _write_count(len(value), out)
-        out += value
+    def writing(self) -> Written:
+        return Written(self._path, _write_blob)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         count, at = _read_count(payload, at, 1)
@@ -161,12 +149,14 @@ class _Numbers(_Part):
     min_bytes = 4
 
     def __init__(self, path: str, scalar: Scalar) -> None:
-        self._get = attrgetter(path)
+        self._path = path
         self._code, self._size = PRIMITIVES[scalar.ros]
         self._enum = scalar.enum
 
-    def write(self, owner: Any, out: bytearray) -> None:
-        values = self._get(owner)
+    def writing(self) -> Written:
+        return Written(self._path, self._write)
+
+    def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
         _write_count(len(values), out)
         if values:
             _pad(out, self._size)
@@ -193,27 +183,29 @@ class _Items(_Part):
     """A sequence, or a fixed array, of Structs or strings."""
 
     def __init__(self, path: str, element: Nested | Text, count: int | None) -> None:
-        self._get = attrgetter(path)
+        self._path = path
         self._count = count
         if isinstance(element, Nested):
             layout = Layout(element)
-            self._write: Callable[[Any, bytearray], None] = layout.write
+            self._write_one: Write = layout.write
             self._read: Callable[[bytes, int], tuple[Any, int]] = layout.read
             self._element_min = layout.min_bytes
         else:
-            self._write = _write_text
+            self._write_one = _write_text
             self._read = _read_text
             self._element_min = _Text.min_bytes
         self.min_bytes = 4 if count is None else count * self._element_min
 
-    def write(self, owner: Any, out: bytearray) -> None:
-        values = self._get(owner)
+    def writing(self) -> Written:
+        return Written(self._path, self._write)
+
+    def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
         if self._count is None:
             _write_count(len(values), out)
         elif len(values) != self._count:
             raise ValueError(f"an array of {len(values)} where {self._count} belong")
         for value in values:
-            self._write(value, out)
+            self._write_one(value, out)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         if self._count is None:
@@ -277,6 +269,11 @@ def _read_count(payload: bytes, at: int, element_bytes: int) -> tuple[int, int]:
     if count * element_bytes > len(payload) - at:  # before anything of that size is made
         raise NotThisType(f"{count} elements cannot fit")
     return int(count), at
+
+
+def _write_blob(value: bytes, out: bytearray) -> None:
+    _write_count(len(value), out)
+    out += value
 
 
 def _write_text(text: str, out: bytearray) -> None:

@@ -20,6 +20,8 @@ from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
 
+from robot_io.cdr_packer import Made, Slot, builder_of
+
 # ROS 2 primitive -> (code of the struct module, bytes); sizes and alignment are the same number in CDR.
 PRIMITIVES: dict[str, tuple[str, int]] = {
     "bool": ("?", 1),
@@ -131,14 +133,26 @@ def leaves(shape: Nested, prefix: str = "") -> Iterator[tuple[str, Shape]]:
             yield prefix + name, field
 
 
-def builder(shape: Nested) -> Callable[[Iterator[Any]], Any]:
-    """Return the function that makes the Struct from the values of its leaves, in wire order."""
-    struct_type = shape.struct_type
-    makers = [builder(field) if isinstance(field, Nested) else next for _, field in shape.fields]
-    names = [name for name, _ in shape.fields]
-    if tuple(names) != tuple(_positional(struct_type)):
+def builder(shape: Nested) -> Callable[[list[Any]], Any]:
+    """Return the function that makes the Struct from its values, in wire order: fixed arrays of numbers are flat."""
+    return builder_of(_made(shape))
+
+
+def _made(shape: Nested) -> Made:
+    if tuple(name for name, _ in shape.fields) != _positional(shape.struct_type):
         raise TypeError(f"{shape.ros_name}: fields must be positional, in order")
-    return lambda found: struct_type(*[make(found) for make in makers])
+    children: list[Made | Slot] = []
+    for _, field in shape.fields:
+        match field:
+            case Nested():
+                children.append(_made(field))
+            case Scalar(_, enum):
+                children.append(Slot(None, enum))
+            case Many(Scalar(_, enum), int() as length):
+                children.append(Slot(length, enum))
+            case _:
+                children.append(Slot())
+    return Made(shape.struct_type, children)
 
 
 def _positional(struct_type: Any) -> tuple[str, ...]:
