@@ -82,3 +82,18 @@ def test_edge_exit_is_found_inside_the_step():
     fine, coarse = where_lost(2e-5), where_lost(8e-4)
     assert coarse[0] == pytest.approx(fine[0], abs=2e-3)
     assert coarse[1] == pytest.approx(fine[1], abs=5e-3)
+
+
+def test_a_ball_meets_a_corner_at_the_right_moment():
+    # a box turned by 45 degrees: the ball touches its corner when their distance is the radius, inside a step
+    slider = PushedSlider(SliderModel(Rectangle(0.4, 0.4), 15, 15 * 0.153, 0.3), (0.0, 0.0, math.pi / 4), 0.05)
+    ball, gap = (-0.2 * math.sqrt(2) - 0.05 - 0.00123, 0.0), 0.00123
+    for step in range(40):
+        to = (ball[0] + 1e-4, 0.0)
+        outcome = slider.step(ball, to, 1e-3)
+        ball = to
+        assert outcome.in_contact is (step >= 12)
+        assert slider.gap_m(ball) > -1e-9
+    assert outcome.mode is ContactMode.STICKING
+    assert (outcome.normal_x, outcome.normal_y) == pytest.approx((1.0, 0.0), abs=1e-9)
+    assert slider.x_m == pytest.approx(40e-4 - gap, abs=1e-9)

@@ -59,10 +59,11 @@ def test_fast_loop_and_offsets():
     assert offset_per_newton_m(0.3, 0.1, 13.7) == pytest.approx(0.95, abs=0.01)
 
 
-def test_the_weave_grows_beyond_the_limit_and_not_below():
-    k_y = sticking_limit(BARREL, 0.3)
-    assert growth_rate(BARREL, 0.3, 0.97 * k_y, frictionless=False) < 0
-    assert growth_rate(BARREL, 0.3, 1.03 * k_y, frictionless=False) > 0
+@pytest.mark.parametrize("body", [BOX, BARREL])
+def test_the_weave_grows_beyond_the_limit_and_not_below(body):
+    k_y = sticking_limit(body, 0.3)
+    assert growth_rate(body, 0.3, 0.97 * k_y, frictionless=False) < 0
+    assert growth_rate(body, 0.3, 1.03 * k_y, frictionless=False) > 0
 
 
 @pytest.mark.long

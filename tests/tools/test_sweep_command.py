@@ -142,6 +142,16 @@ def test_a_damaged_part_is_run_again(tmp_path, grid, capsys):
     assert (out / "results.csv").read_bytes() == expected
 
 
+def test_a_part_of_another_study_is_run_again(tmp_path, grid, capsys):
+    for name, gains in (("one", "0.3,0.2"), ("other", "0.3,0.1")):
+        push(capsys, grid, "--out", tmp_path / name, "--gains", gains, "--workers", 1)
+    expected = (tmp_path / "one" / "results.csv").read_bytes()
+    foreign = (tmp_path / "other" / "parts" / "000000.npz").read_bytes()
+    (tmp_path / "one" / "parts" / "000000.npz").write_bytes(foreign)
+    push(capsys, grid, "--out", tmp_path / "one", "--gains", "0.3,0.2", "--workers", 1, "--resume")
+    assert (tmp_path / "one" / "results.csv").read_bytes() == expected
+
+
 def test_a_failing_item_is_rows_and_not_an_abort(tmp_path, grid, capsys, monkeypatch):
     monkeypatch.setattr(sweep_items, "MOST_LANES_PER_ITEM", 3)
     from sim_backend import batch
