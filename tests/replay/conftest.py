@@ -11,10 +11,19 @@ from tests.replay.runs import push, ticks_in
 from tools.run_log import RunLog
 
 
+QUICK = (
+    *("--set", "ft.tare_seconds_s=0.3"),
+    *("--set", "control.approach_speed_m_per_s=0.1"),
+    *("--set", "control.ramp_s=0.3"),
+    *("--set", "control.retreat_m=0.0"),
+)
+"""Less waiting around the push."""
+
+
 def short_push(tmp_path_factory: pytest.TempPathFactory, *words: str) -> Path:
     folder = tmp_path_factory.mktemp("push")
     out = folder / "run"
-    done = push("run", *words, "--distance-m", "0.2", "--out", out, "--no-report", state=folder / "state")
+    done = push("run", *words, *QUICK, "--distance-m", "0.2", "--out", out, "--no-report", state=folder / "state")
     assert done.returncode == 0, done.stderr
     return out
 

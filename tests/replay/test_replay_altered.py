@@ -229,16 +229,16 @@ WORLD = {
     "start": ("/world/start", 0, lambda data: START_CDR.encode(replace(START_CDR.decode(data), start_ns=0))),
     "first state": ("/world/state", 0, lambda data: flipped(data, 20, 1)),
     "a state's force": (
-        "/world/state", 600, lambda d: STATE_CDR.encode(replace(s := STATE_CDR.decode(d), force_x=one_ulp(s.force_x))),
+        "/world/state", 250, lambda d: STATE_CDR.encode(replace(s := STATE_CDR.decode(d), force_x=one_ulp(s.force_x))),
     ),
     "last state": ("/world/state", -1, lambda data: flipped(data, len(data) - 8, 1)),
     "a state's endless time": ("/world/state", 5, lambda data: data[:4] + struct.pack("<q", 2**62) + data[12:]),
     "a command": (
-        "/world/command", 201, lambda d: COMMAND_CDR.encode(replace(COMMAND_CDR.decode(d), twist=BodyTwist(0.1, 0, 0))),
+        "/world/command", 101, lambda d: COMMAND_CDR.encode(replace(COMMAND_CDR.decode(d), twist=BodyTwist(0.1, 0, 0))),
     ),
-    "a command's arrival": ("/world/command", 201, lambda data: flipped(data, 7, 1)),
+    "a command's arrival": ("/world/command", 101, lambda data: flipped(data, 7, 1)),
     "the last command, which nothing follows": ("/world/command", -1, lambda data: flipped(data, 12, 1)),
-    "padding": ("/world/command", 100, lambda data: data + b"\x00"),
+    "padding": ("/world/command", 90, lambda data: data + b"\x00"),
 }  # fmt: skip
 
 
