@@ -5,6 +5,7 @@ Linux only: prctl(2) PR_SET_PDEATHSIG and PR_SET_TIMERSLACK, sched_setscheduler(
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import resource
@@ -43,6 +44,12 @@ def try_realtime(priority: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def leave_realtime() -> None:
+    """Go back to normal scheduling; nothing happens where `try_realtime` was refused."""
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
 
 
 def forbid_new_descriptors() -> None:

@@ -20,6 +20,7 @@ from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.config import RigConfig
 from robot_io.errors import OperatorStop, PushError, SafetyStop
 from robot_io.event_loop import EventLoop
+from robot_io.process import leave_realtime, try_realtime
 from safety.gate import Latch
 from tools import run_dir
 from tools.aftermath import figures_of
@@ -30,6 +31,9 @@ from tools.processes import Processes
 from tools.saved_tare import SavedTare
 from tools.start_errors import combined, not_in_time
 
+PRIORITY = 1
+"""Below all others of the run. Not for its work: a process that is killed needs the processor to die, and the base is
+stopped by this one's death."""
 EMULATORS_READY_NS = 20 * NS_PER_S
 READY_NS = 20 * NS_PER_S
 """Each device has its own, shorter deadline; these only catch a process that hangs before it."""
@@ -155,10 +159,14 @@ class Launcher:
     def _watch(self) -> None:
         """Wait for control's end."""
         control = self._children["control"]
-        while control.process.poll() is None:
-            self._loop.run_once(50)
-            if self._gate_latch and monotonic_ns() - self._status_ns > FROZEN_NS:
-                control.process.kill()  # the base has its zeros; a frozen control would only hide the end
+        try_realtime(PRIORITY)
+        try:
+            while control.process.poll() is None:
+                self._loop.run_once(50)
+                if self._gate_latch and monotonic_ns() - self._status_ns > FROZEN_NS:
+                    control.process.kill()  # the base has its zeros; a frozen control would only hide the end
+        finally:
+            leave_realtime()
         self._hear(control)
         self._live.end()
 

@@ -1,8 +1,9 @@
 """One process of a pushing run killed or frozen: when the base was told zero, when its wheels stood, what stayed.
 
 All times are CLOCK_MONOTONIC: the signal's here, a command's arrival and the wheels' in the log of the emulated world.
-A round in which the host did not let the gate or the emulators run for 10 ms in all (the kernel's own count of time
-spent waiting for a processor), or took processor time away from this machine, says nothing and is repeated.
+A round in which the host did not let the gate or the emulators (or a launcher that is to die) run for 10 ms in all (the
+kernel's own count of time spent waiting for a processor), or took processor time away from this machine, says nothing
+and is repeated.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from tests.push_runs import QUICK, Ended, Run, stands, started, world_of
 PUSHING = r"PUSH .* v 0\.10 m/s"
 STALL_MS = 10.0
 ROUNDS = 3
-WATCHED = ("gate", "emulators")
 
 
 class Round(NamedTuple):
@@ -48,11 +48,12 @@ def pushing(state: Path, folder: Path, *more: str, **popen: Any) -> Iterator[tup
 def strike(state: Path, folder: Path, name: str, number: signal.Signals, *, log: str = "run.mcap") -> Round:
     """Send a signal to one process of a pushing run, wait for the end of everything, and read its log."""
     with pushing(state, folder) as (run, pids):
-        before = _waited_ms(pids)
+        watched = {pids[who] for who in ("gate", "emulators", *([name] if name == "launcher" else []))}
+        before = _waited_ms(watched)
         at_ns = time.monotonic_ns()
         os.kill(pids[name], number)
         time.sleep(0.12)
-        stall_ms = max(after - before[who] for who, after in _waited_ms(pids).items())
+        stall_ms = max(after - before[who] for who, after in _waited_ms(watched).items())
         ended = run.wait(20.0)
         run.wait_gone(3.0)
         gone_ms = (time.monotonic_ns() - at_ns) / 1e6
@@ -103,12 +104,12 @@ def _kept(found: Round, zero_ms: float | None, rest_ms: float) -> bool:
     return found.zero_ms is not None and found.zero_ms <= zero_ms and found.rest_ms <= found.zero_ms + rest_ms
 
 
-def _waited_ms(pids: dict[str, int]) -> dict[str, float]:
-    """Return how long each watched process, and the machine itself, has waited for a processor so far."""
-    waited = {"machine": float(Path("/proc/stat").read_text().split()[8]) * 1000.0 / os.sysconf("SC_CLK_TCK")}
-    for name in WATCHED:
+def _waited_ms(pids: set[int]) -> dict[int, float]:
+    """Return how long each process, and as 0 the machine itself, has waited for a processor so far."""
+    waited = {0: float(Path("/proc/stat").read_text().split()[8]) * 1000.0 / os.sysconf("SC_CLK_TCK")}
+    for pid in pids:
         with contextlib.suppress(OSError):  # the one that was killed
-            waited[name] = int(Path(f"/proc/{pids[name]}/schedstat").read_text().split()[1]) / 1e6
+            waited[pid] = int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) / 1e6
     return waited
 
 

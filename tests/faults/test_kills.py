@@ -52,9 +52,9 @@ def logged_faults(found: Round) -> list[str]:
     return [event.fault for event in events if event.kind == "fault"]
 
 
-def check_dead_control(found: Round, fault: str) -> None:
-    """Check everything that does not depend on who died."""
-    assert fault in logged_faults(found)
+def check_dead_control(found: Round, *faults: str) -> None:
+    """Check everything that does not depend on who died; one of `faults` must be in the log."""
+    assert set(faults) & set(logged_faults(found))
     assert found.last_state_ms > found.rest_ms, "the log goes on until the wheels stand"
     replays(found.folder)
 
@@ -77,7 +77,9 @@ def test_control_killed(state, tmp_path, again):
 @pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
 def test_launcher_killed(state, tmp_path, again):
     found = within(state, tmp_path, "launcher", KILL, zero_ms=ZERO_MS, rest_ms=REST_MS)
-    check_dead_control(found, "F65")
+    # Its pipe to control breaks a moment before the kernel kills control: where a tick falls in between, control has
+    # taken it for the operator's stop (F64), and is killed while it brakes.
+    check_dead_control(found, "F65", "F64")
     assert found.ended.code == -KILL
 
 
