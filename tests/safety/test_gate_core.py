@@ -120,6 +120,31 @@ def test_a_step_of_the_turn_rate(sign):
         assert judged(frame(twist=BodyTwist(0.1, 0.0, sign * step))).latch == latch
 
 
+def test_every_limit_itself_still_passes_and_the_next_number_does_not():
+    """To the last bit, from rest (where the sums are exact), with an acceleration that is not 1."""
+    limits = GateLimits(0.15, 0.25, 2.0, 0.5, 10 * MS)
+    for key, most, latch in (
+        ("vx", 1.2 * 2.0 * (10 * MS * 1e-9), Latch.STEP),
+        ("vy", 1.2 * 2.0 * (10 * MS * 1e-9), Latch.STEP),
+        ("omega", 1.2 * 0.5 * (10 * MS * 1e-9), Latch.STEP),
+        ("vx", 0.15 * (1.0 + 1e-9), Latch.ENVELOPE),
+        ("omega", 0.25 * (1.0 + 1e-9), Latch.ENVELOPE),
+    ):
+        # towards the envelope from just below it, towards a step from rest
+        before = BodyTwist(**{key: most - 1e-3}) if latch == Latch.ENVELOPE else ZERO
+        for value, found in ((most, Latch.NONE), (math.nextafter(most, 1.0), latch)):
+            after = on_frame(
+                limits, replace(ROLLING, twist=before), frame(twist=BodyTwist(**{key: value})), T0 + 10 * MS
+            )
+            assert after.latch == found
+
+
+def test_ticks_count_from_number_zero_too():
+    start = replace(ROLLING, tick=0, twist=ZERO)
+    assert judged(frame(tick=3, twist=BodyTwist(0.0359)), start).latch == Latch.NONE
+    assert judged(frame(tick=3, twist=BodyTwist(0.0361)), start).latch == Latch.STEP
+
+
 def test_a_tick_that_leaps_ahead_excuses_no_step():
     """At most 50 ms may pass between two frames: 6 ticks of 12 mm/s, whatever the tick says."""
     start = replace(ROLLING, twist=BodyTwist(0.02, 0.0, 0.0))
@@ -189,6 +214,7 @@ def test_the_first_cause_stays_for_ever_and_nothing_but_zero_is_left():
     state = latched(ROLLING, Latch.STEP)
     for after in (
         judged(frame(), state),
+        judged(frame(twist=ZERO), state),  # nothing is wrong with this one, and it is too late
         judged(None, state),
         on_clock(state, T0 + 10**12),
         latched(state, Latch.LINK),
