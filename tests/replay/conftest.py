@@ -10,7 +10,6 @@ from robot_io.tick import TICK_CDR, ControlTick, Phase
 from tests.replay.runs import push, ticks_in
 from tools.run_log import RunLog
 
-
 QUICK = (
     *("--set", "ft.tare_seconds_s=0.3"),
     *("--set", "control.approach_speed_m_per_s=0.1"),
