@@ -42,11 +42,13 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
         gain_f, k_y, speed, f_max = lanes[i, 8] + 1.0, lanes[i, 9], lanes[i, 10], lanes[i, 11]
         open_loop = lanes[i, 12] != 0.0
         x, fx, fy = 0.0, 1.0, 0.0
+        v_x, v_y = fx, fy  # the slider's centre moves along the force, so this has the force's direction sooner
         straight = 0.0 if is_round else 1.0
         per_length = 1.0 / reach if is_round else 0.0
-        dd = d * d
+        per_d = 1.0 / d
+        per_dd = per_d * per_d
         jt = -reach
-        att = 1.0 + jt * jt / dd
+        att = 1.0 + jt * jt * per_dd
         max_y = max_y_c = max_theta = 0.0
         min_ratio = 1.0
         sticking = left = right = 0
@@ -72,13 +74,14 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
             if abs(s) > half_width:
                 end = 1
                 break
-            theta_p = 0.0 if open_loop else gain_f * atan2(fy, fx) + k_y * y_c
+            theta_p = 0.0 if open_loop else gain_f * atan2(v_y, v_x) + k_y * y_c
             max_theta = max(max_theta, abs(theta_p))
-            v_n, v_t = speed * cos(theta_p - psi), speed * sin(theta_p - psi)
-            min_ratio = min(min_ratio, v_n / speed)
-            ann = 1.0 + jn * jn / dd
-            ant = jn * jt / dd
-            det = 1.0 + (jn * jn + jt * jt) / dd
+            ratio = cos(theta_p - psi)
+            min_ratio = min(min_ratio, ratio)
+            v_n, v_t = speed * ratio, speed * sin(theta_p - psi)
+            ann = 1.0 + jn * jn * per_dd
+            ant = jn * jt * per_dd
+            det = 1.0 + (jn * jn + jt * jt) * per_dd
             stick_t = ann * v_t - ant * v_n
             limit = mu * v_n * det
             g_left = ann + mu * ant
@@ -95,10 +98,11 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
                 h_t = -mu * h_n
                 slip = v_t - ant * h_n - att * h_t
             else:
-                h_n = (att * v_n - ant * v_t) / det
-                h_t = stick_t / det
+                per_det = 1.0 / det
+                h_n = (att * v_n - ant * v_t) * per_det
+                h_t = stick_t * per_det
                 slip = 0.0
-            turn = (jn * h_n + jt * h_t) / d
+            turn = (jn * h_n + jt * h_t) * per_d
             size = np.sqrt(h_n * h_n + h_t * h_t + turn * turn)
             if size < 1e-150:
                 end = 2
@@ -114,7 +118,7 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
             fx, fy = v_x * scale, v_y * scale
             x += v_x * dt
             y += v_y * dt
-            phi += turn / d * dt
+            phi += turn * per_d * dt
             s += slip * dt
             step += 1
         finals[i, 0], finals[i, 1], finals[i, 2], finals[i, 3], finals[i, 4], finals[i, 5] = x, y, phi, s, fx, fy

@@ -1,6 +1,7 @@
 """`push bench physics`: how fast the slider's solvers are, each against the same arithmetic in C, in one run.
 
-All figures are for this machine and this moment; the ratios are what can be compared.
+All figures are for this machine and this moment; the ratios are what can be compared. Figures of one core are processor
+time, so that a busy machine does not spoil them much; the whole study is wall time.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ if TYPE_CHECKING:
 
 C_SOURCE = Path(__file__).with_name("lanes_bench.c")
 C_FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
-ROUNDS = 5
+ROUNDS = 20
 """Batch and C take turns so many times; the best time of each counts."""
-BATCH_STEPS = 3000
+BATCH_STEPS = 1000
 PYTHON_STEPS = 4000
 OSQP_STEPS = 1500
 COMPILE_TIMEOUT_S = 120.0
@@ -121,9 +122,9 @@ def _kernels(lanes: list[Lane], c_run: Run | None) -> dict[str, Any]:
     best = dict.fromkeys(runs, float("inf"))
     for _ in range(ROUNDS + 1):  # the first round loads the compiled code
         for name, function in runs.items():
-            began = time.perf_counter()
+            began = time.process_time()
             function(rows, timing, *outputs[name])
-            best[name] = min(best[name], time.perf_counter() - began)
+            best[name] = min(best[name], time.process_time() - began)
     per_step = {name: seconds / (len(lanes) * BATCH_STEPS) * 1e9 for name, seconds in best.items()}
     agree = float(np.abs(outputs["batch"][1] - outputs["c"][1]).max()) if c_run else None
     return {
@@ -139,18 +140,18 @@ def _python_ns(lanes: list[Lane], solve: Any, steps: int) -> float:
     chosen = [lanes[121], lanes[364]]
     timing = Timing(steps=steps // len(chosen))
     simulate_lane(chosen[0], Timing(steps=50), solve)
-    began = time.perf_counter()
+    began = time.process_time()
     for lane in chosen:
         simulate_lane(lane, timing, solve)
-    return (time.perf_counter() - began) / (timing.steps * len(chosen)) * 1e9
+    return (time.process_time() - began) / (timing.steps * len(chosen)) * 1e9
 
 
 def _closed_form_ns() -> float:
     calls = 50_000
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in range(calls):
         solve_exact(-0.5, 0.2, 1.0, 0.0, 0.1, 0.02, 0.38, 1.0, 0.5)
-    return (time.perf_counter() - began) / calls * 1e9
+    return (time.process_time() - began) / calls * 1e9
 
 
 def _study_seconds() -> dict[str, Any]:

@@ -8,9 +8,9 @@ void run_lanes(const double *lanes, long count, double dt, long steps, long ever
         const int round = p[0] != 0.0, open_loop = p[12] != 0.0;
         const double reach = p[1], half_width = p[2], d = p[3], mu = p[4];
         const double gain_f = p[8] + 1.0, k_y = p[9], speed = p[10], f_max = p[11];
-        double x = 0.0, y = p[5], phi = p[6], s = p[7], fx = 1.0, fy = 0.0;
+        double x = 0.0, y = p[5], phi = p[6], s = p[7], fx = 1.0, fy = 0.0, v_x = 1.0, v_y = 0.0;
         const double straight = round ? 0.0 : 1.0, per_length = round ? 1.0 / reach : 0.0;
-        const double dd = d * d, jt = -reach, att = 1.0 + jt * jt / dd;
+        const double per_d = 1.0 / d, per_dd = per_d * per_d, jt = -reach, att = 1.0 + jt * jt * per_dd;
         double max_y = 0.0, max_y_c = 0.0, max_theta = 0.0, min_ratio = 1.0;
         long sticking = 0, left = 0, right = 0, step = 0, until_record = 0;
         double *kept = states + 6 * records * i;
@@ -33,11 +33,13 @@ void run_lanes(const double *lanes, long count, double dt, long steps, long ever
                 end = 1;
                 break;
             }
-            const double theta_p = open_loop ? 0.0 : gain_f * atan2(fy, fx) + k_y * y_c;
+            const double theta_p = open_loop ? 0.0 : gain_f * atan2(v_y, v_x) + k_y * y_c;
             max_theta = fmax(max_theta, fabs(theta_p));
-            const double v_n = speed * cos(theta_p - psi), v_t = speed * sin(theta_p - psi);
-            min_ratio = fmin(min_ratio, v_n / speed);
-            const double ann = 1.0 + jn * jn / dd, ant = jn * jt / dd, det = 1.0 + (jn * jn + jt * jt) / dd;
+            const double ratio = cos(theta_p - psi);
+            min_ratio = fmin(min_ratio, ratio);
+            const double v_n = speed * ratio, v_t = speed * sin(theta_p - psi);
+            const double ann = 1.0 + jn * jn * per_dd, ant = jn * jt * per_dd;
+            const double det = 1.0 + (jn * jn + jt * jt) * per_dd;
             const double stick_t = ann * v_t - ant * v_n, limit = mu * v_n * det;
             const double g_left = ann + mu * ant, g_right = ann - mu * ant;
             double h_n, h_t, slip;
@@ -54,11 +56,12 @@ void run_lanes(const double *lanes, long count, double dt, long steps, long ever
                 h_t = -mu * h_n;
                 slip = v_t - ant * h_n - att * h_t;
             } else {
-                h_n = (att * v_n - ant * v_t) / det;
-                h_t = stick_t / det;
+                const double per_det = 1.0 / det;
+                h_n = (att * v_n - ant * v_t) * per_det;
+                h_t = stick_t * per_det;
                 slip = 0.0;
             }
-            const double turn = (jn * h_n + jt * h_t) / d;
+            const double turn = (jn * h_n + jt * h_t) * per_d;
             const double size = sqrt(h_n * h_n + h_t * h_t + turn * turn);
             if (size < 1e-150) {
                 end = 2;
@@ -70,9 +73,10 @@ void run_lanes(const double *lanes, long count, double dt, long steps, long ever
                 left++;
             else
                 right++;
-            const double v_x = h_n * n_x - h_t * n_y, v_y = h_n * n_y + h_t * n_x, scale = f_max / size;
+            v_x = h_n * n_x - h_t * n_y, v_y = h_n * n_y + h_t * n_x;
+            const double scale = f_max / size;
             fx = v_x * scale, fy = v_y * scale;
-            x += v_x * dt, y += v_y * dt, phi += turn / d * dt, s += slip * dt;
+            x += v_x * dt, y += v_y * dt, phi += turn * per_d * dt, s += slip * dt;
             step++;
         }
         double *f = finals + 6 * i, *q = statistics + 9 * i;
