@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     Run = Callable[[Floats, Timing, Floats, Floats, Floats], None]
 
 C_SOURCE = Path(__file__).with_name("lanes_bench.c")
-C_FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
+C_FLAGS = ("-O3", "-march=native", "-ffast-math", "-fPIC", "-c")
 ROUNDS = 20
 """Batch and C take turns so many times; the best time of each counts."""
 BATCH_STEPS = 1000
@@ -85,13 +85,14 @@ def build_c(folder: Path) -> tuple[Run | None, str | None]:
     compiler = next((found for name in ("gcc", "cc", "clang") if (found := shutil.which(name))), None)
     if compiler is None:
         return None, "no C compiler (gcc, cc, clang) on the path"
-    library = folder / "lanes_bench.so"
-    done = subprocess.run(
-        [compiler, *C_FLAGS, str(C_SOURCE), "-o", str(library), "-lm"],
-        capture_output=True, text=True, timeout=COMPILE_TIMEOUT_S, check=False,
-    )  # fmt: skip
-    if done.returncode != 0:
-        return None, f"{compiler} failed: {' '.join(done.stderr.split())[:200]}"
+    code, library = folder / "lanes_bench.o", folder / "lanes_bench.so"
+    # linked without -ffast-math: with it, loading the library would make this whole process flush tiny numbers to 0
+    for command in ([*C_FLAGS, str(C_SOURCE), "-o", str(code)], ["-shared", str(code), "-o", str(library), "-lm"]):
+        done = subprocess.run(
+            [compiler, *command], capture_output=True, text=True, timeout=COMPILE_TIMEOUT_S, check=False
+        )
+        if done.returncode != 0:
+            return None, f"{compiler} failed: {' '.join(done.stderr.split())[:200]}"
     function = ctypes.CDLL(str(library)).run_lanes
     array, count = ctypes.c_void_p, ctypes.c_long
     function.argtypes = [array, count, ctypes.c_double, count, count, array, count, array, array]
