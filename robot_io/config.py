@@ -168,6 +168,8 @@ class SliderConfig(Table, frozen=True):
     contact_friction: Annotated[float, Meta(ge=0, le=2)] = 0.30
     pressure: Literal["uniform", "rim", "point"] = "uniform"
     """`uniform` by the integral in the paper, `rim` at the greatest distance, `point` a tenth of uniform."""
+    cof_m: Vector2 = (0.0, 0.0)
+    """Centre of friction, from the middle: along the push and to the left (a load that is not in the middle)."""
 
 
 class FloorConfig(Table, frozen=True):

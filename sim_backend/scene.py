@@ -34,6 +34,7 @@ def slider_model(config: SliderConfig) -> SliderModel:
         floor_friction=config.floor_friction,
         contact_friction=config.contact_friction,
         pressure=config.pressure,
+        cof_m=config.cof_m,
     )
 
 

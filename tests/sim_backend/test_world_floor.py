@@ -35,3 +35,10 @@ def test_each_effect_changes_the_push():
         assert end_of_push(f"world.floor.{setting}") != even
     # pressure that runs ahead steadies the push: the same open-loop push turns the slider less
     assert abs(end_of_push("world.floor.push_height_m=0.3").yaw) < abs(even.yaw)
+
+
+def test_a_load_to_the_left_turns_the_slider_left():
+    centred = ("world.start.edge_offset_m=0.0", "world.start.heading_deg=0.0", "world.start.lateral_offset_m=0.0")
+    assert end_of_push(*centred).yaw == 0.0
+    assert end_of_push(*centred, "world.slider.cof_m=[0.0, 0.02]").yaw > 0.01
+    assert end_of_push(*centred, "world.slider.cof_m=[0.0, -0.02]").yaw < -0.01
