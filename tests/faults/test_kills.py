@@ -15,8 +15,8 @@ import pytest
 from robot_io.log_messages import SAFETY_EVENT
 from robot_io.tick import TICK_CDR
 from safety.faults import FAULTS
-from tests.faults.kill_rounds import Round, pushing, strike, within
-from tests.push_runs import PUSH, ROOT, messages, stands, world_of
+from tests.faults.kill_rounds import Round, strike, within
+from tests.push_runs import PUSH, QUICK, ROOT, messages, stands, started, world_of
 
 KILL, STOP = signal.SIGKILL, signal.SIGSTOP
 ZERO_MS = 20.0
@@ -161,8 +161,9 @@ if "tools.control_process" in sys.orig_argv:
 
 def test_an_exception_in_the_loop(state, tmp_path):
     (tmp_path / "sitecustomize.py").write_text(BROKEN_FOLD)
-    with pushing(state, tmp_path / "run", env={"PYTHONPATH": str(tmp_path)}) as (run, _):
-        ended = run.wait(20.0)
+    argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
+    with started(state, *argv, env={"PYTHONPATH": str(tmp_path)}) as run:
+        ended = run.wait(60.0)
         run.wait_gone(3.0)
         assert ended.code == 1, ended.err
         summary = ended.last_object

@@ -113,7 +113,7 @@ def closed_address():
 
 def test_missing_port(state, tmp_path):
     rig = mixed(tmp_path, "ft", f'port = "{tmp_path}/ttyUSB7"')
-    error = push_fails(state, tmp_path, 4, rig, "--move-robot")
+    error = device_fails(state, tmp_path, 4, rig)
     assert error["what"] == "there is no such port"
     assert error["where"] == f"ft300 {tmp_path}/ttyUSB7"
     assert error["do"]
@@ -161,8 +161,8 @@ def test_wrong_topic_type(state, tmp_path):
         assert "base.topics" in error["do"]
 
 
-@pytest.mark.parametrize("url", ["ws://", "ws://127.0.0.1:nine"])
-def test_an_address_that_is_no_bridge(state, tmp_path, url):
+def test_an_address_that_is_no_bridge(state, tmp_path):
+    url = "ws://127.0.0.1:nine"
     error = device_fails(state, tmp_path, 2, mixed(tmp_path, "base", f'url = "{url}"'))
     assert url in f"{error['where']} {error['what']}"
 
@@ -201,6 +201,9 @@ def test_every_device_that_is_not_there_is_named(state, tmp_path):
     ):
         assert f"{device} {where}: " in error["what"]
         assert f"{device}: " in error["do"], "what to try"
+    plain = finished(state, "run", str(rig), "--move-robot", "--out", str(tmp_path / "out"))
+    assert (plain.code, plain.out) == (4, "")
+    assert plain.err == ended.err
     for device in ("ft", "arm", "base"):
         assert re.search(rf"^{device} +hardware", ended.err, re.MULTILINE), "announced before anything is opened"
 
