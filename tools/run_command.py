@@ -188,10 +188,13 @@ def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTa
 
 
 def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
-    """Keep the tare of a run that got that far, for `--start-in-contact`."""
+    """Keep the tare of a run that got that far, for `--start-in-contact`; when it cannot be, say so."""
     if figures["tared"]:
         bias = (*figures["bias_force_N"], *figures["bias_torque_Nm"])
-        saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
+        try:
+            saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
+        except OSError as error:
+            tell(f"the tare was not kept: {error}")
 
 
 def write_summary(summary: dict[str, Any], out: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import time
 from pathlib import Path
@@ -10,19 +11,20 @@ from pathlib import Path
 from robot_io.config import RigConfig, rig_to_toml
 from robot_io.errors import UsageError
 
+MOST_IN_A_SECOND = 1000
 RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
 
 
 def create(out: str | None, rig_name: str) -> Path:
-    """Create and return the run's folder (default: `runs/RIG-TIME`).
+    """Create and return the run's folder (default: `runs/RIG-TIME`, with a number when there is one already).
 
     Raises UsageError when it already holds a run, or cannot be made.
     """
     path = Path(out) if out else Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
-    if any((path / name).exists() for name in RUN_FILES):
+    if any((path / name).exists() for name in RUN_FILES) and out:
         raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        path = _made(path, given=bool(out))
         probe = path / ".writable"
         probe.touch()
         probe.unlink()
@@ -31,6 +33,19 @@ def create(out: str | None, rig_name: str) -> Path:
             f"the run's folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
         ) from None
     return path
+
+
+def _made(path: Path, *, given: bool) -> Path:
+    """Make the folder; one that was not given must be new, because runs may start within the same second."""
+    if given:
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+    for number in range(1, MOST_IN_A_SECOND):
+        numbered = path if number == 1 else path.with_name(f"{path.name}-{number}")
+        with contextlib.suppress(FileExistsError):
+            numbered.mkdir(parents=True)
+            return numbered
+    raise FileExistsError(errno.EEXIST, "too many runs at the same time", str(path))
 
 
 def discard(path: Path) -> None:

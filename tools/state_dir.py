@@ -33,9 +33,14 @@ class RigLock:
     """At most one run per rig on this machine; held until the process ends, released by the kernel."""
 
     def __init__(self, rig_name: str) -> None:
-        """Take the lock. Raises EnvironmentFault when another run holds it."""
+        """Take the lock. Raises EnvironmentFault when another run holds it, or its file cannot be opened."""
         self._path = state_dir() / f"{file_name(rig_name)}.lock"
-        self._fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            self._fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise EnvironmentFault(
+                f"the rig's lock cannot be opened: {error.strerror}", where=str(self._path), do="Remove that file"
+            ) from None
         try:
             fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
