@@ -59,7 +59,7 @@ class Ft300Emulator:
         self._streams_at_boot = streaming
         self._streaming = streaming
         self._registers = SensorRegisters(firmware, serial, year, acceleration_g)
-        self._port = PtyPort(loop, self._on_bytes, link)
+        self._port = PtyPort(loop, self._on_bytes, self._on_sent, link)
         self._to_host = WireDirection(paced=self.knobs.paced)
         self._to_sensor = WireDirection(paced=self.knobs.paced)
         self._scanner = wire.RequestScanner()
@@ -195,7 +195,7 @@ class Ft300Emulator:
         return bytes(byte * 167 + 13 & 0xFF for byte in data)
 
     def _look_at_baud(self) -> None:
-        self._baud_fits = self._port.attached and self._port.baud_is(termios.B19200)
+        self._baud_fits = bool(self._port.path) and self._port.baud_is(termios.B19200)
 
     # From the host to the sensor.
 
@@ -207,6 +207,14 @@ class Ft300Emulator:
         if self._to_sensor.room < READ_BYTES:
             self._port.pause()
         self._schedule_hearing()
+
+    def _on_sent(self) -> None:
+        """Hear at once what is still on its way: a real client waited for that before its port was closed."""
+        now_ns = monotonic_ns()
+        data = self._to_sensor.take(self._to_sensor.free_ns)
+        self._to_sensor.clear()
+        if data and not self._is_stalled(now_ns):
+            self._hear(data, now_ns)
 
     def _schedule_hearing(self) -> None:
         if len(self._to_sensor) and "hear" not in self._timers:
@@ -225,24 +233,25 @@ class Ft300Emulator:
     def _hear(self, data: bytes, now_ns: int) -> None:
         pause_ns, self._last_rx_ns = now_ns - self._last_rx_ns, now_ns
         if self._streaming:
-            self._look_for_stop(data, now_ns)
-        elif now_ns >= self._modbus_from_ns:
+            data = self._look_for_stop(data, now_ns)
+        if data and now_ns >= self._modbus_from_ns:
             if pause_ns > REQUEST_PAUSE_NS:
                 self._scanner.clear()
             for request in self._scanner.feed(data):
                 self._counted["requests"] += 1
                 self._serve(request, now_ns)
 
-    def _look_for_stop(self, data: bytes, now_ns: int) -> None:
-        """Count 0xFF; whatever else is said to a streaming sensor is ignored."""
-        for byte in data:
+    def _look_for_stop(self, data: bytes, now_ns: int) -> bytes:
+        """Count 0xFF; whatever else is said to a streaming sensor is ignored. Return what came after the stop."""
+        for index, byte in enumerate(data, 1):
             self._stop_bytes_seen = self._stop_bytes_seen + 1 if byte == wire.STOP_BYTE else 0
             if self._stop_bytes_seen >= self.knobs.stop_bytes:
                 self._streaming = False
                 self._registers.output = 0
                 self._counted["stops"] += 1
                 self._modbus_from_ns = now_ns + _ns(self.knobs.mode_change_ms)
-                return
+                return data[index:]
+        return b""
 
     def _serve(self, request: bytes, now_ns: int) -> None:
         reply = self._registers.serve(request)

@@ -20,8 +20,8 @@ class Ft300Knobs(msgspec.Struct, frozen=True):
     """Whether the start of the stream is acknowledged."""
     stop_bytes: int = 50
     """How many 0xFF in a row stop the stream."""
-    mode_change_ms: float = 100.0
-    """Deaf for this long after a stop."""
+    mode_change_ms: float = 0.0
+    """Deaf for this long after a stop (real: unknown; clients exist that ask at once, and others that wait 100 ms)."""
     unknown: Literal["exception", "silence"] = "exception"
     """Answer to unknown registers, functions and values."""
     corrupt_every: int = 0

@@ -27,11 +27,21 @@ BAUD_AT_FIRST = termios.B9600
 
 
 class PtyPort:
-    """A pty with its slave in raw mode, served in `loop`; bytes of the client go to `on_bytes`."""
+    """A pty with its slave in raw mode, served in `loop`; bytes of the client go to `on_bytes`.
 
-    def __init__(self, loop: EventLoop, on_bytes: Callable[[bytes], None], link: str | None = None) -> None:
+    `on_sent` is called when the client has closed its port: closing a real one waits until all is sent (Linux).
+    """
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        on_bytes: Callable[[bytes], None],
+        on_sent: Callable[[], None],
+        link: str | None = None,
+    ) -> None:
         self._loop = loop
         self._on_bytes = on_bytes
+        self._on_sent = on_sent
         self._link = Path(link) if link else None
         self._master = -1
         self._look: Timer | None = None
@@ -57,7 +67,7 @@ class PtyPort:
         os.close(slave)
         os.set_blocking(self._master, False)
         self._hang_up_poll = select.poll()
-        self._hang_up_poll.register(self._master, 0)  # a hang-up is reported unasked
+        self._hang_up_poll.register(self._master, select.POLLIN)  # a hang-up is reported unasked
         if self._link is not None:
             beside = self._link.with_name(f"{self._link.name}.{os.getpid()}")
             beside.symlink_to(self.path)
@@ -111,8 +121,15 @@ class PtyPort:
         self._look = self._loop.call_every(LOOK_PERIOD_NS, self._on_look)
 
     def _on_look(self, _deadline_ns: int) -> None:
-        """See whether somebody opened the slave: the hang-up is gone (a client that only listens sends nothing)."""
-        if any(events & select.POLLHUP for _, events in self._hang_up_poll.poll(0)):
+        """See whether somebody opened the slave: the hang-up is gone (a client that only listens sends nothing).
+
+        A client may have opened, written and closed it since the last look.
+        """
+        state = next((events for _, events in self._hang_up_poll.poll(0)), 0)
+        if state & select.POLLHUP:
+            while state & select.POLLIN and (data := self._read()):
+                self._on_bytes(data)
+                self._on_sent()
             return
         assert self._look is not None
         self._look.cancel()
@@ -123,16 +140,22 @@ class PtyPort:
         self._loop.add_fd(self._master, self._on_ready)
 
     def _on_ready(self, events: int) -> None:
-        data = b""
-        if events & READ:
-            with contextlib.suppress(OSError):  # EIO: the client closed it; EAGAIN: nothing after all
-                data = os.read(self._master, READ_BYTES)
-        if data:
+        if data := self._read() if events & (READ | HANGUP) else b"":
             self._on_bytes(data)
-        elif events & HANGUP:
-            self._loop.remove_fd(self._master)
-            self._forget_unread()
-            self._await_client()
+        if not events & HANGUP:
+            return
+        # At once: the client may open it again within a millisecond, and then the hang-up is gone.
+        while data := self._read():
+            self._on_bytes(data)
+        self._loop.remove_fd(self._master)
+        self._forget_unread()
+        self._on_sent()
+        self._await_client()
+
+    def _read(self) -> bytes:
+        with contextlib.suppress(OSError):  # EIO: the client closed it; EAGAIN: nothing
+            return os.read(self._master, READ_BYTES)
+        return b""
 
     def _forget_unread(self) -> None:
         """Drop what the client left unread: a real port does when it is closed, a pty keeps it for the next one."""

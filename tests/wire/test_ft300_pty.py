@@ -224,17 +224,40 @@ def test_link_follows_the_port_and_is_removed(tmp_path):
     assert not link.is_symlink()
 
 
+def test_what_is_written_before_a_port_is_closed_is_heard():
+    """As from a shell: open, write, close at once. A real port is closed only when all of it is sent."""
+    with ft300_process(streaming=True) as emulator:
+        fd = open_port(emulator.port)
+        os.write(fd, b"\xff" * 50)
+        os.close(fd)
+        assert until(lambda: emulator.counters()["stops"] == 1)
+        fd = open_port(emulator.port)
+        termios.tcflush(fd, termios.TCIFLUSH)
+        os.write(fd, READ_FIRMWARE)
+        assert read_for(fd, 7) == FIRMWARE
+        os.close(fd)
+
+
+def test_a_request_right_behind_the_stop_bytes_is_answered():
+    with ft300_process(streaming=True, knobs={"collisions": False}) as emulator:
+        fd = open_port(emulator.port)
+        os.write(fd, b"\xff" * 50 + READ_FIRMWARE)
+        # What the stream still had on the line comes first, then the answer and nothing else.
+        assert read_for(fd, 1000, limit_s=1.0).endswith(FIRMWARE)
+        os.close(fd)
+
+
 def test_link_replaces_a_stale_link_but_nothing_else(tmp_path):
     stale, file = tmp_path / "stale", tmp_path / "file"
     stale.symlink_to("/dev/pts/nonexistent")
     file.write_text("precious")
     loop = EventLoop()
-    port = PtyPort(loop, lambda _data: None, str(stale))
+    port = PtyPort(loop, lambda _data: None, lambda: None, str(stale))
     port.open()
     assert str(stale.readlink()) == port.path
     port.close()
     with pytest.raises(EnvironmentFault, match="in the way"):
-        PtyPort(loop, lambda _data: None, str(file)).open()
+        PtyPort(loop, lambda _data: None, lambda: None, str(file)).open()
     assert file.read_text() == "precious"
     loop.close()
 
