@@ -107,9 +107,11 @@ def test_two_bridges_on_one_port_number():
 
 def test_all_share_one_world():
     """The sensor of the world reads tool weight and bias: not zero, and not what `ft300` alone reads."""
-    argv = ("all", "emulated", "--seed", "3", "--arm-host", "127.0.42.7", "--base-port", "0")
-    with emulate(*argv, lines=3) as (child, endpoints):
+    where = ("--arm-host", "127.0.42.7", "--base-host", "127.0.42.8", "--base-port", "9292")
+    with emulate("all", "emulated", "--seed", "3", *where, lines=3) as (child, endpoints):
         ft, ur, base = endpoints
+        assert ur["host"] == "127.0.42.7"
+        assert base["url"] == "ws://127.0.42.8:9292"
         assert [endpoint["device"] for endpoint in endpoints] == ["ft300", "ur10", "ridgeback"]
         forces = [value / 100.0 for value in registers_of(ft["port"])[:3]]
         assert max(abs(force) for force in forces) > 10.0
