@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ import pytest
 from robot_io.log_messages import SAFETY_EVENT
 from robot_io.tick import TICK_CDR
 from safety.faults import FAULTS
-from tests.faults.kill_rounds import Round, strike, within
+from tests.faults.kill_rounds import Round, pushing, strike, within
 from tests.push_runs import PUSH, QUICK, ROOT, messages, stands, started, world_of
 
 KILL, STOP = signal.SIGKILL, signal.SIGSTOP
@@ -186,3 +187,34 @@ def test_an_exception_in_the_loop(state, tmp_path):
     assert (zero_ns - failed_ns) / 1e6 < ZERO_MS
     assert stands(wheels[-1][1])
     replays(tmp_path / "run")
+
+
+ENDLESS_FOLD = """
+import sys
+if "tools.control_process" in sys.orig_argv:
+    from msgspec.structs import replace
+    from tools.tick_core import TickCore
+    fold = TickCore.fold
+    def endless(self, state, inp):
+        after, output = fold(self, state, inp)
+        return after, replace(output, finished=False)
+    TickCore.fold = endless
+"""
+
+
+@pytest.mark.long
+def test_a_second_stop_ends_a_control_that_does_not_end(state, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(ENDLESS_FOLD)
+    with pushing(state, tmp_path / "run", env={"PYTHONPATH": str(tmp_path)}) as (run, pids):
+        run.signal(signal.SIGINT)
+        run.wait_for("stopping")
+        time.sleep(1.5)  # whoever asks again within a second means the same stop
+        assert pids["control"] in run.alive()
+        run.signal(signal.SIGINT)
+        ended = run.wait(10.0)
+        run.wait_gone(3.0)
+    assert ended.code == 130, ended.err
+    assert [note for note in ended.last_object["notes"] if "killed by the operator" in note]
+    commands, wheels = world_of(tmp_path / "run" / "run.mcap")
+    assert stands(commands[-1][1])
+    assert stands(wheels[-1][1])
