@@ -1,7 +1,7 @@
 """Script upload on the emulated controller (ports 30001, 30002, 30003): text in, nothing out.
 
-A program is `def name():` up to a line that is exactly `end`; `sec name():` runs beside the program; any other
-line is a program of its own. The state streams of these ports are not emulated.
+A program is `def name():` up to an `end` as far in as its `def` (blocks inside it are further in); `sec name():`
+runs beside the program; any other line is a program of its own. The state streams of these ports are not emulated.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ class ScriptClient(TcpClient):
         self._seen = seen
         self._rest = b""
         self._program: list[str] = []
+        self._end = ""
 
     def on_bytes(self, data: bytes) -> None:
         """See `TcpClient.on_bytes`."""
@@ -35,22 +36,23 @@ class ScriptClient(TcpClient):
             self.close()
             return
         for line in lines:
-            self._on_line(line.decode("utf-8", "replace").rstrip("\r"))
+            self._on_line(line.decode("utf-8", "replace").rstrip())
 
     def _on_line(self, line: str) -> None:
         if self._program:
             self._program.append(line)
-            if line == "end":
+            if line == self._end:
                 self._run("\n".join(self._program) + "\n")
                 self._program = []
-        elif line.startswith(("def ", "sec ")):
+        elif (text := line.lstrip()).startswith(("def ", "sec ")):
             self._program = [line]
-        elif line.strip() and not line.lstrip().startswith("#"):
+            self._end = line.removesuffix(text) + "end"
+        elif text and not text.startswith("#"):
             self._run(line + "\n")
 
     def _run(self, text: str) -> None:
         self._seen.scripts.append(text.split("\n", 1)[0])
-        if not text.startswith("sec "):
+        if not text.lstrip().startswith("sec "):
             self._robot.upload(text)
 
 

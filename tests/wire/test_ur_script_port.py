@@ -2,6 +2,7 @@
 
 import socket
 import struct
+from pathlib import Path
 
 import pytest
 
@@ -55,6 +56,18 @@ def test_nothing_starts_before_the_closing_end(robot) -> None:
         assert list(robot.get("seen.scripts")) == []
         connection.sendall(b"end\n")
         wait_until(lambda: runtime(robot) == PLAYING, "it plays after the end")
+
+
+def test_an_indented_program_is_one_program(robot) -> None:
+    golden = Path(__file__).parents[1] / "golden/ur_script_indented_program.txt"
+    sent = [line[2:].partition("#")[0] for line in golden.read_text().splitlines() if line.startswith(">")]
+    upload(robot.host, bytes.fromhex("".join(sent)).decode())
+    wait_until(lambda: runtime(robot) == PLAYING, "it plays")
+    wait_cycles(robot, 10)
+    assert robot.get("controller.program.name") == "svt"
+    assert len(list(robot.get("seen.scripts"))) == 1
+    upload(robot.host, "def other():\n  sync()\nend  \r\n", 30001)  # blanks and CR behind the end
+    wait_until(lambda: list(robot.get("seen.scripts"))[1:] == ["def other():"], "the next one is complete too")
 
 
 def test_a_secondary_program_leaves_the_running_one_alone(robot) -> None:
