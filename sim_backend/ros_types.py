@@ -95,6 +95,18 @@ class RosTypes:
         filled: dict[str, Any] = self._value(type_name.replace("/msg/", "/"), message, type_name)
         return filled
 
+    def full_text(self, type_name: str) -> str:
+        """Return a type's definition with all it is made of, as `gendeps --cat` prints it (genmsg)."""
+        kind = type_name.replace("/msg/", "/")
+        kinds, texts = [kind], list[str]()
+        for nested in kinds:  # grows while it is walked
+            fields = self._fields_of(nested)
+            texts.append("".join(f"{field} {name}\n" for name, field in fields))
+            kinds += dict.fromkeys(field for _, field in fields if "/" in field and field not in kinds)
+        return f"\n{'=' * 80}\n".join(
+            f"MSG: {nested}\n{text}" if nested != kind else text for nested, text in zip(kinds, texts, strict=True)
+        )
+
     def _value(self, kind: str, value: object, path: str) -> Any:
         if kind in ("float64", "float32"):
             return self._float(value, path)

@@ -180,6 +180,30 @@ def test_services(client: Client):
     assert failed["id"] == "s3"
 
 
+def test_services_that_lists_and_viewers_ask(client: Client):
+    """roslibjs and roslibpy list nodes and services so; viewers ask for the definitions of all types."""
+    nodes = client.call("/rosapi/nodes")["values"]["nodes"]
+    assert {"/twist_mux", "/vicon_bridge", "/rosbridge_websocket", "/rosapi"} <= set(nodes)
+    assert "/rosapi/topics" in client.call("/rosapi/services")["values"]["services"]
+    assert client.call("/rosapi/service_type", {"service": "/rosapi/topic_type"})["values"] == {
+        "type": "rosapi/TopicType"
+    }
+    assert client.call("/rosapi/service_type", {"service": "/nope"})["values"] == {"type": ""}
+    assert client.call("/rosapi/topics_for_type", {"type": "ridgeback_msgs/Status"})["values"] == {
+        "topics": ["/mcu/status"]
+    }
+    assert client.call("/rosapi/get_param", {"name": "/rosdistro", "default": '"noetic"'})["values"] == {
+        "value": '"noetic"'
+    }
+    raw = client.call("/rosapi/topics_and_raw_types")["values"]
+    texts = dict(zip(raw["types"], raw["typedefs_full_text"], strict=True))
+    assert texts["geometry_msgs/Twist"] == (
+        "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n\n" + "=" * 80 + "\n"
+        "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+    )
+    assert texts["nav_msgs/Odometry"].count("MSG: ") == 8
+
+
 @pytest.mark.parametrize(
     "text",
     [
