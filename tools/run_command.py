@@ -11,6 +11,7 @@ from robot_io.error_report import say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools import run_dir, saved_tare, verdict
+from tools.gain_warning import gain_warning
 from tools.live_line import LiveLine
 from tools.report_process import ReportProcess
 from tools.rig import devices_at, resolve_rig
@@ -43,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
     """Push; return the run's exit code. Raises PushError where it could not begin."""
     rig = resolve_rig(args.rig, overrides(args))
     check_flags(args, rig)
+    if warning := gain_warning(rig):
+        tell(warning)
     saved = saved_tare.load(rig) if args.start_in_contact else None
     if args.dry_run:
         return dry_run(args, rig)
