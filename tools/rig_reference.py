@@ -1,6 +1,6 @@
 """Writes docs/rig-files.md from the types of `robot_io/config.py`.
 
-    python -m tools.rig_reference > docs/rig-files.md
+python -m tools.rig_reference > docs/rig-files.md
 """
 
 from __future__ import annotations
