@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import select
+import socket
 
 from serial.urlhandler import protocol_socket
 
@@ -12,6 +13,8 @@ MOST_READS = 16
 
 class TcpPort(protocol_socket.Serial):
     """`socket://host:port`; connecting, flushing and closing end whatever the peer does."""
+
+    _socket: socket.socket  # made by `open`; the type stubs leave it out
 
     def open(self) -> None:
         """Connect within 2 s. Raises SerialException."""
