@@ -322,3 +322,10 @@ def test_thresholds_of_the_task():
     assert task_checks.check(GOOD, replace(TARED, backward_ticks=20), BodyTwist(), NOW) == ["F56"]
     assert task_checks.check(GOOD, replace(TARED, residual_N=5.0), BodyTwist(), NOW) == []
     assert task_checks.check(GOOD, replace(TARED, residual_N=beyond(5.0)), BodyTwist(), NOW) == ["F09"]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_the_bias_is_taken_off_each_axis(axis):
+    force = tuple(60.0 if i == axis else 0.0 for i in range(3))
+    torque = tuple(12.0 if i == axis else 0.0 for i in range(3))
+    assert sensor(force, torque, replace(TARED, bias_force=force, bias_torque=torque)) == []
