@@ -14,10 +14,10 @@ demo: runtime ## set up, push a box 2 m with the real drivers over wire emulator
 	$(BIN)/push replay $(DEMO)/run.mcap
 
 test: check ## set up, check style, types and import rules, run all tests but the long ones
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 test-all: check ## the same with the long tests
-	$(BIN)/python -m pytest -q -m 'not hardware'
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not hardware"
 
 check: dev ## ruff, mypy strict and the import contracts, no tests
 	$(BIN)/ruff check .
