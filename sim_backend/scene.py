@@ -7,8 +7,9 @@ import random
 
 import msgspec
 
-from robot_io.config import FloorConfig, RigConfig, SliderConfig
+from robot_io.config import RigConfig
 from robot_io.messages import Pose2D
+from robot_io.world_config import FloorConfig, SliderConfig
 from sim_backend.floor import Floor, FloorEffects
 from sim_backend.shapes import Circle, Rectangle
 from sim_backend.slider import SliderModel

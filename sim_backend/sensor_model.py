@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import random
 
-from robot_io.config import RigConfig, Vector3
+from robot_io.config import RigConfig
+from robot_io.config_types import Vector3
 
 GRAVITY_M_PER_S2 = 9.81
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from robot_io.config import Matrix3, RigConfig, load_rig
+from robot_io.config import RigConfig, load_rig
+from robot_io.config_types import Matrix3
 from robot_io.errors import ConfigError
 
 ROTATION_TOLERANCE = 1e-6

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Meta
 
-from robot_io import config
+from robot_io import config, world_config
 from robot_io.config import RigConfig
 
 INTRO = """# Rig files
@@ -99,7 +99,8 @@ def _default(field: msgspec.structs.FieldInfo) -> str:
 def _field_notes() -> dict[tuple[str, str], str]:
     """Return the text below each field of the source, by (class, field)."""
     notes = {}
-    for node in ast.parse(inspect.getsource(config)).body:
+    source = inspect.getsource(config) + inspect.getsource(world_config).split("annotations", 1)[1]
+    for node in ast.parse(source).body:
         if not isinstance(node, ast.ClassDef):
             continue
         for field, text in zip(node.body, node.body[1:], strict=False):

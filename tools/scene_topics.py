@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from robot_io.config import Matrix3, RigConfig
+from robot_io.config import RigConfig
+from robot_io.config_types import Matrix3
 from robot_io.ros_messages import (
     Header,
     Path,

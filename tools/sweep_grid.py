@@ -17,7 +17,7 @@ import msgspec
 from msgspec import Meta
 
 from robot_io import toml_text
-from robot_io.config import NonNegative, Positive, Table
+from robot_io.config_types import NonNegative, Positive, Table
 from robot_io.errors import ConfigError
 from robot_io.table_check import build
 from robot_io.toml_text import Origins
