@@ -329,3 +329,16 @@ def test_the_bias_is_taken_off_each_axis(axis):
     force = tuple(60.0 if i == axis else 0.0 for i in range(3))
     torque = tuple(12.0 if i == axis else 0.0 for i in range(3))
     assert sensor(force, torque, replace(TARED, bias_force=force, bias_torque=torque)) == []
+
+
+@pytest.mark.parametrize("y", [0.08, -0.08])
+def test_a_base_that_goes_sideways_as_it_was_told_ignores_nothing(y):
+    assert not ignoring(BodyTwist(0.06, y, 0.0), BodyTwist(0.06, y, 0.0))
+    assert ignoring(BodyTwist(0.06, -y, 0.0), BodyTwist(0.06, y, 0.0))
+
+
+@pytest.mark.parametrize("at", [Pose2D(3.0, -4.0, 2.0), Pose2D(-3.0, 4.0, -2.0)])
+def test_a_base_that_stands_anywhere_has_not_jumped_nor_turned(at):
+    seen = SafetyState(pose_seq=5, pose_ns=NOW, pose_x=at.x, pose_y=at.y, pose_yaw=at.yaw)
+    after, found = base(seen, control=replace(TARED, held_yaw=at.yaw), pose=at, pose_seq=6)
+    assert (after.pose_jumps, found) == (0, [])
