@@ -84,6 +84,18 @@ def new_figure(height_in: float, *, constrained: bool = True) -> Figure:
     return figure
 
 
+def new_panels(height_in: float, *, left_in: float = 0.75, gap_in: float = 0.1) -> Figure:
+    """Return an empty figure with fixed margins for panels one above the other, `gap_in` apart.
+
+    Room for the labels is known here, and asking matplotlib for it costs as much as drawing does.
+    """
+    figure = new_figure(height_in, constrained=False)
+    figure.subplots_adjust(
+        left=left_in / WIDTH_IN, right=0.985, bottom=0.5 / height_in, top=1.0 - 0.27 / height_in, hspace=gap_in
+    )
+    return figure
+
+
 def png(figure: Figure, dpi: float = DPI) -> bytes:
     """Return a figure as PNG; the same figure gives the same bytes."""
     engine = figure.get_layout_engine()
@@ -92,7 +104,7 @@ def png(figure: Figure, dpi: float = DPI) -> bytes:
         engine.execute(figure)
         figure.set_layout_engine("none")
     target = io.BytesIO()
-    figure.savefig(target, dpi=dpi, format="png", metadata={"Software": None})
+    figure.savefig(target, dpi=dpi, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return target.getvalue()
 
 

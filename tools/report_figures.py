@@ -20,6 +20,7 @@ from tools.figure_style import (
     SKY,
     VERMILLION,
     new_figure,
+    new_panels,
     no_data,
     plain,
     png,
@@ -62,7 +63,7 @@ def figures(run: RunData) -> dict[str, bytes]:
 
 def force(run: RunData) -> Figure:
     """Draw the force on the object, and how far the raw reading is from the limits (on a logarithmic scale)."""
-    figure = new_figure(4.6)
+    figure = new_panels(4.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     ticks, control, limits = run.ticks, run.rig.control, run.rig.limits
     if not len(ticks["t_s"]):
@@ -93,7 +94,7 @@ def force(run: RunData) -> Figure:
 
 def speed(run: RunData) -> Figure:
     """Draw the speed of the base: wanted by the law, commanded after safety, measured by odometry."""
-    figure = new_figure(3.1)
+    figure = new_panels(3.1)
     axes = figure.subplots()
     ticks = run.ticks
     if not len(ticks["t_s"]):
@@ -112,7 +113,7 @@ def speed(run: RunData) -> Figure:
 
 def tracking(run: RunData) -> Figure:
     """Draw lateral offset, the angles of force and push, and the base's heading error."""
-    figure = new_figure(5.6)
+    figure = new_panels(5.6, left_in=1.0)
     panels = figure.subplots(3, 1, sharex=True)
     ticks = run.ticks
     if not len(ticks["t_s"]):
@@ -139,7 +140,7 @@ def tracking(run: RunData) -> Figure:
 
 def timing(run: RunData) -> Figure:
     """Draw how late the ticks woke, and when ticks were skipped."""
-    figure = new_figure(4.0)
+    figure = new_panels(4.0, gap_in=0.55)
     top, bottom = figure.subplots(2, 1, height_ratios=(3, 1))
     late = run.late
     if not late.total:
