@@ -55,7 +55,6 @@ class BasePlant:
         self._tick_due_ns = self._grid_time_of_tick(0)
         self._now_ns = start_ns
         self._x, self._y, self._yaw = start.x, start.y, start.yaw
-        self._odom_x = self._odom_y = self._odom_yaw = 0.0
         self._velocity = BodyTwist()
         self._drivers_active = True
         self._target = BodyTwist()
@@ -74,14 +73,14 @@ class BasePlant:
         return Pose2D(self._x, self._y, _wrapped(self._yaw))
 
     @property
+    def place(self) -> tuple[float, float, float]:
+        """The pose as plain numbers: x, y in m, yaw in rad (not wrapped)."""
+        return self._x, self._y, self._yaw
+
+    @property
     def velocity(self) -> BodyTwist:
         """Velocity of the wheels in the BODY frame."""
         return self._velocity
-
-    @property
-    def odometry(self) -> Pose2D:
-        """Pose as the wheels count it: same motion, its own origin at the start."""
-        return Pose2D(self._odom_x, self._odom_y, _wrapped(self._odom_yaw))
 
     @property
     def drivers_active(self) -> bool:
@@ -151,10 +150,6 @@ class BasePlant:
         self._x += (v.vx * cosine - v.vy * sine) * _GRID_S
         self._y += (v.vx * sine + v.vy * cosine) * _GRID_S
         self._yaw += turn
-        cosine, sine = math.cos(self._odom_yaw + 0.5 * turn), math.sin(self._odom_yaw + 0.5 * turn)
-        self._odom_x += (v.vx * cosine - v.vy * sine) * _GRID_S
-        self._odom_y += (v.vx * sine + v.vy * cosine) * _GRID_S
-        self._odom_yaw += turn
 
 
 def _approach(target: float, before: float, limit: float, step: float) -> float:

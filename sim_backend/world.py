@@ -54,7 +54,7 @@ class World:
         self._sensor = SensorModel(rig, seed)
         self._arm = ArmTruth(rig.arm.held_pose_rad, (0.0,) * 6)
         self._reach = rig.frames.contact_in_base_m[:2]
-        self._ball = self._ball_of(scene.base)
+        self._ball = self._ball_of(*self._plant.place)
         self._contact = FREE
         self._start_ns = start_ns
         self._steps = 0
@@ -115,16 +115,16 @@ class World:
     def _step(self) -> None:
         self._steps += 1
         self._plant.step_to(self.now_ns)
-        ball = self._ball_of(self._plant.pose)
+        ball = self._ball_of(*self._plant.place)
         self._contact = self._slider.step(self._ball, ball, GRID_NS * 1e-9)
         self._ball = ball
         if self._steps % STATE_EVERY_STEPS == 0:
             self._on_record(self._state())
 
-    def _ball_of(self, base: Pose2D) -> tuple[float, float]:
-        cos, sin = math.cos(base.yaw), math.sin(base.yaw)
-        x, y = self._reach
-        return base.x + cos * x - sin * y, base.y + sin * x + cos * y
+    def _ball_of(self, x: float, y: float, yaw: float) -> tuple[float, float]:
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        reach_x, reach_y = self._reach
+        return x + cos * reach_x - sin * reach_y, y + sin * reach_x + cos * reach_y
 
     def _state(self) -> WorldState:
         contact = self._contact
