@@ -24,9 +24,13 @@ from typing import Any, NamedTuple
 from robot_io.mcap_read import LogMessage, read_log
 from robot_io.messages import BodyTwist
 from robot_io.world_messages import COMMAND_CDR, STATE_CDR
+from tests.host_watch import HostStalled, HostWatch
 
 ROOT = Path(__file__).resolve().parents[1]
 PUSH = [sys.executable, "-c", "from robot_io._entry import main; raise SystemExit(main())"]
+SAFETY_STOP = 5
+SPOILING_MS = 30.0
+"""The shortest pause that a safety check stops for by itself, 40 ms of silence of the arm, less a period of its own."""
 MARK = "PUSH_TEST_RUN"
 """Inherited by every process of a run, so that what is left of it can be found."""
 
@@ -57,9 +61,14 @@ class Ended(NamedTuple):
 
 
 class Run:
-    """A started program. `state` is its private state folder (locks, tares)."""
+    """A started program. `state` is its private state folder (locks, tares).
 
-    def __init__(self, state: Path, argv: tuple[str, ...], **popen: Any) -> None:
+    host: where given, a safety stop while a processor of this machine stood still raises `HostStalled` in `wait`.
+    """
+
+    def __init__(self, state: Path, argv: tuple[str, ...], *, host: HostWatch | None = None, **popen: Any) -> None:
+        self._host = host
+        self._began_ns = time.monotonic_ns()
         self.mark = uuid.uuid4().hex
         self._files = state / self.mark
         self._files.mkdir(parents=True)
@@ -83,7 +92,9 @@ class Run:
         """Wait until it has said something that matches `pattern` on stderr."""
         deadline_s = time.monotonic() + within_s
         while not re.search(pattern, self.err):
-            assert self.process.poll() is None, f"it ended before it said {pattern!r}: {self.err}"
+            if (code := self.process.poll()) is not None:
+                self._blame_the_host(code)
+            assert code is None, f"it ended before it said {pattern!r}: {self.err}"
             assert time.monotonic() < deadline_s, f"it did not say {pattern!r}: {self.err}"
             time.sleep(0.01)
 
@@ -92,7 +103,14 @@ class Run:
 
     def wait(self, within_s: float = 60.0) -> Ended:
         code = self.process.wait(within_s)
+        self._blame_the_host(code)
         return Ended(code, (self._files / "out").read_text(errors="replace"), self.err)
+
+    def _blame_the_host(self, code: int) -> None:
+        if code == SAFETY_STOP and self._host is not None:
+            stall_ms = self._host.worst_ms(self._began_ns, time.monotonic_ns())
+            if stall_ms > SPOILING_MS:
+                raise HostStalled(f"a processor stood still for {stall_ms:.0f} ms: {self.err[-300:]}")
 
     def alive(self) -> dict[int, str]:
         """Return the processes of this run that are left (zombies are not counted), by pid."""

@@ -17,6 +17,7 @@ from robot_io.log_messages import SAFETY_EVENT
 from robot_io.tick import TICK_CDR
 from safety.faults import FAULTS
 from tests.faults.kill_rounds import Round, pushing, strike, within
+from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import PUSH, QUICK, ROOT, messages, stands, started, world_of
 
 KILL, STOP = signal.SIGKILL, signal.SIGSTOP
@@ -27,14 +28,21 @@ REST_MS = 60.0
 GATE_GONE_REST_MS = 330.0
 """The base's own timeout of 0.25 s and its tick, 29 ticks of 10 ms, and 4 more per 0.1 m/s."""
 ARM_GONE_ZERO_MS = 60.0
-"""One tick, and two on the wire, after its end. That takes a while: the wheel's threads wait for a processor as others do
-before the kernel calls the process ended. By the age of its record alone it would be 100 ms."""
-REPEATS = 8
+"""One tick, and two on the wire, after its end. That takes a while: the wheel's threads wait for a processor as others
+do before the kernel calls the process ended. By the age of its record alone it would be 100 ms."""
+AGAIN = 8
 
 
 @pytest.fixture(scope="module")
 def state(tmp_path_factory):
     return tmp_path_factory.mktemp("state")
+
+
+@pytest.fixture(scope="module")
+def host():
+    watch = HostWatch()
+    yield watch
+    watch.close()
 
 
 def replays(folder: Path) -> None:
@@ -61,9 +69,9 @@ def check_dead_control(found: Round, *faults: str) -> None:
     replays(found.folder)
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
-def test_control_killed(state, tmp_path, again):
-    found = within(state, tmp_path, "control", KILL, zero_ms=ZERO_MS, rest_ms=REST_MS)
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+def test_control_killed(state, tmp_path, host, again):
+    found = within(state, tmp_path, "control", KILL, host, zero_ms=ZERO_MS, rest_ms=REST_MS)
     check_dead_control(found, "F65")
     assert found.ended.code == 5, found.ended.err
     summary = found.ended.last_object
@@ -76,27 +84,27 @@ def test_control_killed(state, tmp_path, again):
     assert json.loads((found.folder / "summary.json").read_text()) == summary
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
-def test_launcher_killed(state, tmp_path, again):
-    found = within(state, tmp_path, "launcher", KILL, zero_ms=ZERO_MS, rest_ms=REST_MS)
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+def test_launcher_killed(state, tmp_path, host, again):
+    found = within(state, tmp_path, "launcher", KILL, host, zero_ms=ZERO_MS, rest_ms=REST_MS)
     # Its pipe to control breaks a moment before the kernel kills control: where a tick falls in between, control has
     # taken it for the operator's stop (F64), and is killed while it brakes.
     check_dead_control(found, "F65", "F64")
     assert found.ended.code == -KILL
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
-def test_control_frozen(state, tmp_path, again):
-    found = within(state, tmp_path, "control", STOP, zero_ms=FROZEN_ZERO_MS, rest_ms=REST_MS)
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+def test_control_frozen(state, tmp_path, host, again):
+    found = within(state, tmp_path, "control", STOP, host, zero_ms=FROZEN_ZERO_MS, rest_ms=REST_MS)
     check_dead_control(found, "F66")
     assert found.ended.code == 5, found.ended.err
     assert found.ended.last_object["faults"] == ["F66"]
     assert FAULTS["F66"].text in found.ended.err
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
-def test_gate_killed_and_the_base_stops_by_its_own_timeout(state, tmp_path, again):
-    found = within(state, tmp_path, "gate", KILL, zero_ms=None, rest_ms=GATE_GONE_REST_MS)
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+def test_gate_killed_and_the_base_stops_by_its_own_timeout(state, tmp_path, host, again):
+    found = within(state, tmp_path, "gate", KILL, host, zero_ms=None, rest_ms=GATE_GONE_REST_MS)
     assert found.zero_ms is None, "nobody else holds the base's connection"
     assert "F67" in logged_faults(found)
     assert found.ended.code == 5, found.ended.err
@@ -104,9 +112,9 @@ def test_gate_killed_and_the_base_stops_by_its_own_timeout(state, tmp_path, agai
     replays(found.folder)
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, REPEATS))])
-def test_arm_killed(state, tmp_path, again):
-    found = within(state, tmp_path, "arm", KILL, zero_ms=ARM_GONE_ZERO_MS, rest_ms=REST_MS)
+@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+def test_arm_killed(state, tmp_path, host, again):
+    found = within(state, tmp_path, "arm", KILL, host, zero_ms=ARM_GONE_ZERO_MS, rest_ms=REST_MS)
     assert "F69" in logged_faults(found)
     assert found.ended.code == 5, found.ended.err
     assert found.ended.last_object["faults"][0] == "F69"
@@ -114,16 +122,18 @@ def test_arm_killed(state, tmp_path, again):
 
 
 @pytest.mark.long
-def test_arm_frozen(state, tmp_path):
-    found = strike(state, tmp_path / "run", "arm", STOP)
+@repeated_when_the_host_stalls
+def test_arm_frozen(state, tmp_path, host):
+    found = strike(state, tmp_path / "run", "arm", STOP, host)
     assert "F24-hold" in logged_faults(found)
     assert found.ended.code == 5, found.ended.err
     replays(found.folder)
 
 
-def test_recorder_killed(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_recorder_killed(state, tmp_path, host):
     """Nobody is in danger: the push goes on for a second, then the base holds; what was flushed can be recovered."""
-    found = strike(state, tmp_path / "run", "recorder", KILL, log="recovered.mcap")
+    found = strike(state, tmp_path / "run", "recorder", KILL, host, log="recovered.mcap")
     assert found.ended.code == 5, found.ended.err
     summary = found.ended.last_object
     assert summary["faults"] == ["F63"]
@@ -139,9 +149,10 @@ def test_recorder_killed(state, tmp_path):
 
 
 @pytest.mark.long
-def test_all_devices_gone_at_once(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_all_devices_gone_at_once(state, tmp_path, host):
     """The emulators killed: every device is lost, as when the robot is switched off."""
-    found = strike(state, tmp_path / "run", "emulators", KILL)
+    found = strike(state, tmp_path / "run", "emulators", KILL, host)
     assert found.ended.code == 5, found.ended.err
     faults = set(found.ended.last_object["faults"])
     assert faults & {"F30", "F02", "F24-stop", "F69"}
@@ -161,10 +172,11 @@ if "tools.control_process" in sys.orig_argv:
 """
 
 
-def test_an_exception_in_the_loop(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_an_exception_in_the_loop(state, tmp_path, host):
     (tmp_path / "sitecustomize.py").write_text(BROKEN_FOLD)
     argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
-    with started(state, *argv, env={"PYTHONPATH": str(tmp_path)}) as run:
+    with started(state, *argv, host=host, env={"PYTHONPATH": str(tmp_path)}) as run:
         ended = run.wait(60.0)
         run.wait_gone(3.0)
         assert ended.code == 1, ended.err
@@ -204,9 +216,10 @@ if "tools.control_process" in sys.orig_argv:
 
 
 @pytest.mark.long
-def test_a_second_stop_ends_a_control_that_does_not_end(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_a_second_stop_ends_a_control_that_does_not_end(state, tmp_path, host):
     (tmp_path / "sitecustomize.py").write_text(ENDLESS_FOLD)
-    with pushing(state, tmp_path / "run", env={"PYTHONPATH": str(tmp_path)}) as (run, pids):
+    with pushing(state, tmp_path / "run", host, env={"PYTHONPATH": str(tmp_path)}) as (run, pids):
         run.signal(signal.SIGINT)
         run.wait_for("stopping")
         time.sleep(1.5)  # whoever asks again within a second means the same stop

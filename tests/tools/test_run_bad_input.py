@@ -10,6 +10,7 @@ import time
 import pytest
 import serial
 
+from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished, one_error, started
 from tests.ur_emulator_process import EmulatorProcess as UrProcess
 from tests.ur_emulator_process import fresh_address
@@ -31,6 +32,13 @@ url = "{url}"
 @pytest.fixture(scope="module")
 def state(tmp_path_factory):
     return tmp_path_factory.mktemp("state")
+
+
+@pytest.fixture
+def host():
+    watch = HostWatch()
+    yield watch
+    watch.close()
 
 
 def push_fails(state, tmp_path, code, *argv, also_plain=True):
@@ -208,14 +216,15 @@ def test_every_device_that_is_not_there_is_named(state, tmp_path):
         assert re.search(rf"^{device} +hardware", ended.err, re.MULTILINE), "announced before anything is opened"
 
 
-def test_a_sensor_that_already_streams_beside_an_emulated_arm_and_base(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_a_sensor_that_already_streams_beside_an_emulated_arm_and_base(state, tmp_path, host):
     """Left streaming by a client that crashed, it simply works; it feels nothing, so the object is never met."""
     with ft300_process(streaming=True, wrench=(0.5, -1.0, 2.0, 0.0, 0.0, 0.0)) as sensor:
         rig = mixed(tmp_path, "ft", f'port = "{sensor.port}"', "noise_force_N = 0.0")
         settings = ("--set", "path.expected_contact_m=0.0", "--set", "control.lost_rest_s=0.2")
         quick = [setting.replace("speed_m_per_s=0.1", "speed_m_per_s=0.2") for setting in QUICK]
         argv = ("run", rig, "--move-robot", *quick, *settings, "--out", str(tmp_path / "out"), "--json")
-        ended = finished(state, *argv)
+        ended = finished(state, *argv, host=host)
         assert ended.code == 6, ended.err
         assert re.search(rf"^ft +hardware +{sensor.port}$", ended.err, re.MULTILINE)
         assert re.search(r"^arm +emulated$", ended.err, re.MULTILINE)

@@ -18,6 +18,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from robot_io.mcap_read import read_summary
 from robot_io.tick import TICK_CDR, Phase
+from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import PUSH, QUICK, ROOT, Run, finished, messages, one_error, stands, started, world_of
 from tests.ur_emulator_process import wait_until
 
@@ -31,14 +32,35 @@ def state(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("runs") / "one"
+def host():
+    watch = HostWatch()
+    yield watch
+    watch.close()
 
 
 @pytest.fixture(scope="module")
-def done(state, folder):
-    """The run that the first tests look at, with all its defaults but the distance."""
-    return finished(state, "run", "emulated", "--distance-m", str(DISTANCE_M), "--out", str(folder), "--json")
+def shared_run(state, host, tmp_path_factory):
+    """The run that the first tests look at, with all its defaults but the distance; and its folder."""
+    found = []
+
+    @repeated_when_the_host_stalls
+    def push(tmp_path):
+        out = tmp_path / "one"
+        argv = ("run", "emulated", "--distance-m", str(DISTANCE_M), "--out", str(out), "--json")
+        found[:] = [finished(state, *argv, host=host), out]
+
+    push(tmp_path=tmp_path_factory.mktemp("runs"))
+    return found
+
+
+@pytest.fixture(scope="module")
+def done(shared_run):
+    return shared_run[0]
+
+
+@pytest.fixture(scope="module")
+def folder(shared_run):
+    return shared_run[1]
 
 
 @pytest.fixture(scope="module")
@@ -135,10 +157,12 @@ def test_a_folder_with_a_run_is_refused(done, state, folder):
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
-def test_in_contact_with_the_tare_of_the_run_before(done, state, tmp_path):
+@repeated_when_the_host_stalls
+def test_in_contact_with_the_tare_of_the_run_before(done, state, tmp_path, host):
     ended = finished(
         *(state, "run", "emulated", "--start-in-contact", "--distance-m", "0.1"),
         *(*QUICK, "--out", str(tmp_path / "run"), "--json"),
+        host=host,
     )
     assert ended.code == 0, ended.err
     assert ended.last_object["distance_m"] >= 0.1
@@ -161,8 +185,9 @@ def test_in_contact_without_a_tare_is_refused(tmp_path):
     assert not (tmp_path / "x").exists()
 
 
-def test_a_second_run_of_the_same_rig_is_refused_and_stops_are_clean(state, tmp_path):
-    with started(state, "run", "emulated", *QUICK, "--out", str(tmp_path / "first"), "--json") as first:
+@repeated_when_the_host_stalls
+def test_a_second_run_of_the_same_rig_is_refused_and_stops_are_clean(state, tmp_path, host):
+    with started(state, "run", "emulated", *QUICK, "--out", str(tmp_path / "first"), "--json", host=host) as first:
         first.wait_for("PUSH ")
         second = finished(state, "run", "emulated", "--out", str(tmp_path / "second"), "--json")
         error = one_error(second, 3)
@@ -191,9 +216,10 @@ def assert_clean_stop(run: Run, folder, *signals: int) -> None:
     assert {path.name for path in folder.iterdir()} == FILES
 
 
-def test_sigterm_twice_at_once_is_one_clean_stop(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_sigterm_twice_at_once_is_one_clean_stop(state, tmp_path, host):
     """`timeout` signals the program and then its whole group."""
-    with started(state, "run", "barrel", *QUICK, "--out", str(tmp_path / "run"), "--json") as run:
+    with started(state, "run", "barrel", *QUICK, "--out", str(tmp_path / "run"), "--json", host=host) as run:
         run.wait_for("PUSH ")
         run.signal(signal.SIGTERM)
         time.sleep(0.02)  # so that the first one is taken, and the second is not the same pending signal
@@ -217,13 +243,12 @@ def test_ctrl_c_while_starting_leaves_nothing(state, tmp_path, moment):
     assert not out.exists()
 
 
-def test_a_barrel_is_pushed_with_stdin_closed(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_a_barrel_is_pushed_with_stdin_closed(state, tmp_path, host):
     argv = ("run", "barrel", "--distance-m", "0.15", *QUICK, "--out", str(tmp_path / "run"), "--json")
-    closed = ["/bin/sh", "-c", '"$@" <&-', "sh", *PUSH, *argv]
-    env = {**os.environ, "XDG_STATE_HOME": str(state)}
-    ended = subprocess.run(closed, cwd=ROOT, env=env, capture_output=True, text=True, timeout=60, check=False)
-    assert ended.returncode == 0, ended.stderr
-    summary = json.loads(ended.stdout)
+    ended = finished(state, *argv, host=host, preexec_fn=lambda: os.close(0))
+    assert ended.code == 0, ended.err
+    summary = ended.last_object
     assert summary["rig"] == "barrel"
     assert summary["distance_m"] >= 0.15
 
@@ -250,13 +275,14 @@ class Terminal:
         os.close(self.theirs)
 
 
-def test_on_a_terminal_any_key_stops(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_on_a_terminal_any_key_stops(state, tmp_path, host):
     """stdin and stderr are a terminal: a live line, a clean stop by a key, and the terminal is left as it was."""
     terminal = Terminal()
     out = tmp_path / "run"
     before = termios.tcgetattr(terminal.theirs)
     argv = ("run", "emulated", *QUICK, "--out", str(out), "--json")
-    with started(state, *argv, stdin=terminal.theirs, stderr=terminal.theirs) as run:
+    with started(state, *argv, host=host, stdin=terminal.theirs, stderr=terminal.theirs) as run:
         wait_until((out / "processes.json").exists, "the processes", 40.0)
         os.write(terminal.fd, b"r")  # resume means nothing yet, and harms nothing
         terminal.wait_for(b"PUSH ")
@@ -268,23 +294,25 @@ def test_on_a_terminal_any_key_stops(state, tmp_path):
     terminal.close()
 
 
-def test_a_closed_terminal_is_a_clean_stop(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_a_closed_terminal_is_a_clean_stop(state, tmp_path, host):
     """The window is closed, or the connection of a remote login breaks: SIGHUP, and nobody to write to."""
     terminal = Terminal()
     out = tmp_path / "run"
     argv = ("run", "emulated", *QUICK, "--out", str(out), "--json")
-    with started(state, *argv, stdin=terminal.theirs, stderr=terminal.theirs) as run:
+    with started(state, *argv, host=host, stdin=terminal.theirs, stderr=terminal.theirs) as run:
         terminal.wait_for(b"PUSH ")
         terminal.close()
         assert_clean_stop(run, out, signal.SIGHUP)
 
 
 @pytest.mark.long
-def test_a_reader_that_stopped_reading_does_not_hold_up_the_stop(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_a_reader_that_stopped_reading_does_not_hold_up_the_stop(state, tmp_path, host):
     """`push run 2>&1 | less`: nobody reads on, the pipe is full, and a stop must get through all the same."""
     read_fd, write_fd = os.pipe()
     argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
-    with started(state, *argv, stderr=write_fd) as run:
+    with started(state, *argv, host=host, stderr=write_fd) as run:
         shown = b""
         while b"PUSH " not in shown:
             shown += os.read(read_fd, 65536)
@@ -325,9 +353,12 @@ def test_fast_needs_level_sim(state):
 
 @pytest.mark.long
 @pytest.mark.timeout(240)
-def test_six_metres_with_force_feedback(state, tmp_path):
+@repeated_when_the_host_stalls
+def test_six_metres_with_force_feedback(state, tmp_path, host):
     out = tmp_path / "run"
-    ended = finished(state, "run", "emulated", "--distance-m", "6", "--out", str(out), "--json", within_s=200.0)
+    ended = finished(
+        state, "run", "emulated", "--distance-m", "6", "--out", str(out), "--json", within_s=200.0, host=host
+    )
     assert ended.code == 0, ended.err
     assert ended.last_object["distance_m"] >= 6.0
     ticks = [TICK_CDR.decode(message.payload) for message in messages(out / "run.mcap", "/control/tick")]
@@ -338,9 +369,10 @@ def test_six_metres_with_force_feedback(state, tmp_path):
 @pytest.mark.long
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("seed", [0, 7])
-def test_open_loop_loses_the_object(state, tmp_path, seed):
+@repeated_when_the_host_stalls
+def test_open_loop_loses_the_object(state, tmp_path, seed, host):
     argv = ("run", "emulated", "--controller", "open-loop", "--distance-m", "6", "--seed", str(seed))
-    ended = finished(state, *argv, "--out", str(tmp_path / "run"), "--json", within_s=200.0)
+    ended = finished(state, *argv, "--out", str(tmp_path / "run"), "--json", within_s=200.0, host=host)
     assert ended.code == 6, ended.err
     summary = ended.last_object
     assert summary["verdict"] == "contact lost"

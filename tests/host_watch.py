@@ -1,0 +1,82 @@
+"""Whether the host kept every processor running: one small process on each, at the highest priority it may have.
+
+A test on the wall clock that failed while a processor stood still for long says nothing of the program: it is
+repeated, at most three times, and says so. Nothing else is ever repeated, and no bound is widened.
+
+    @repeated_when_the_host_stalls
+    def test_something(state, tmp_path): ...
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+REPEATS = 3
+WATCHER = """
+import ctypes, os, signal, sys, time
+ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)
+os.sched_setaffinity(0, {int(sys.argv[1])})
+try:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))
+except OSError:
+    pass
+last = time.monotonic_ns()
+while True:
+    time.sleep(0.002)
+    now = time.monotonic_ns()
+    if now - last > 8_000_000:
+        os.write(1, b"%d %d\\n" % (last, now))
+    last = now
+"""
+
+
+class HostStalled(Exception):
+    """A run was spoilt by its host."""
+
+
+class HostWatch:
+    """Watches until `close`."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.NamedTemporaryFile("r")  # noqa: SIM115 - closed in close()
+        with open(self._file.name, "ab") as out:  # noqa: PTH123 - appending, as every watcher does
+            self._watchers = [
+                subprocess.Popen([sys.executable, "-c", WATCHER, str(cpu)], stdin=subprocess.DEVNULL, stdout=out)
+                for cpu in sorted(os.sched_getaffinity(0))
+            ]
+
+    def worst_ms(self, since_ns: int, until_ns: int) -> float:
+        """Return the longest time that a processor stood still, of the pauses that touch this span; 0 for none."""
+        self._file.seek(0)
+        pauses = [tuple(map(int, line.split())) for line in self._file.read().splitlines()]
+        return max((b - a for a, b in pauses if b >= since_ns and a <= until_ns), default=0) / 1e6
+
+    def close(self) -> None:
+        for watcher in self._watchers:
+            watcher.kill()
+            watcher.wait()
+        self._file.close()
+
+
+def repeated_when_the_host_stalls(test: Callable[..., None]) -> Callable[..., None]:
+    """Repeat a test that ended in `HostStalled`; it gets a folder of its own each time as `tmp_path`."""
+
+    @functools.wraps(test)
+    def repeat(*args: Any, tmp_path: Any, **kwargs: Any) -> None:
+        for attempt in range(1 + REPEATS):
+            folder = tmp_path / f"attempt{attempt}"
+            folder.mkdir()
+            try:
+                test(*args, tmp_path=folder, **kwargs)
+                return
+            except HostStalled as stalled:
+                print(f"{test.__name__}, attempt {attempt + 1}: {stalled}")
+        raise AssertionError(f"the host stalled in each of {1 + REPEATS} attempts")
+
+    return repeat
