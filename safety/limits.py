@@ -53,6 +53,10 @@ def check(rig: RigConfig) -> None:
         problems.append("limits.hold_slow_rad must be below limits.hold_stop_rad")
     if rig.control.force_min_N >= rig.limits.slow_force_N:
         problems.append("control.force_min_N must be below limits.slow_force_N")
+    if rig.control.approach_speed_m_per_s > speed_limit_m_per_s(rig):
+        problems.append(
+            "control.approach_speed_m_per_s is above the envelope (limits.envelope_factor x control.push_speed_m_per_s)"
+        )
     if problems:
         raise ConfigError("; ".join(problems), where=rig.name, do="Lower the value in the rig file")
 

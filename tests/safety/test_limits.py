@@ -100,3 +100,10 @@ def test_the_settings_are_in_si_units():
     assert settings.pose_period_ns == 10_000_000
     limits = settings.envelope
     assert (limits.speed, limits.turn_rate, limits.period_s) == (pytest.approx(0.15), 0.25, 0.01)
+
+
+def test_an_approach_that_the_envelope_would_clamp_is_refused():
+    rig = with_value("control.push_speed_m_per_s", 0.05)
+    check(replace(rig, control=replace(rig.control, approach_speed_m_per_s=0.075)))
+    with pytest.raises(ConfigError, match="approach_speed_m_per_s"):
+        check(replace(rig, control=replace(rig.control, approach_speed_m_per_s=0.08)))
