@@ -1,4 +1,4 @@
-"""What every process of a run does first: die with its parent, wake up on time, ask for its priority.
+"""How a process of ours is started, and what it does first: die with its parent, wake up on time, ask for its priority.
 
 Linux only: prctl(2) PR_SET_PDEATHSIG and PR_SET_TIMERSLACK, sched_setscheduler(2).
 """
@@ -10,11 +10,23 @@ import ctypes
 import os
 import resource
 import signal
+import sys
+from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_TIMERSLACK = 29
 
 _libc = ctypes.CDLL(None, use_errno=True)
+
+
+def fresh_interpreter(module: str) -> tuple[list[str], dict[str, str]]:
+    """Return command line and environment that run `python -m module` of this program, whatever folder we are in.
+
+    The current folder is kept off the path (-P), for it may hold a `tools` or a `control` of its own; ours come first.
+    """
+    root = str(Path(__file__).resolve().parent.parent)
+    others = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry and entry != root]
+    return [sys.executable, "-P", "-m", module], {**os.environ, "PYTHONPATH": os.pathsep.join([root, *others])}
 
 
 def die_with_parent(parent_pid: int = 0) -> None:

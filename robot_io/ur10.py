@@ -16,7 +16,6 @@ import os
 import select
 import signal
 import subprocess
-import sys
 from typing import IO
 
 import msgspec
@@ -27,6 +26,7 @@ from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.driver import DriverBase
 from robot_io.errors import DeviceError, DeviceUnreachable
 from robot_io.messages import DeviceHealth, DeviceInfo, Joints, JointState, LinkState, Stamped
+from robot_io.process import fresh_interpreter
 from robot_io.shared_record import SharedRecord
 
 START_WITHIN_S: dict[Hold, float] = {"monitor": 5.0, "servo": 8.0}
@@ -51,8 +51,10 @@ def spawn_child(
     own messages. Nothing here waits: enforce a deadline for the first status line.
     """
     job = ArmJob(host, hold, record_fd, os.getpid(), held_pose_rad, held_pose_tolerance_rad, status_fd)
+    command, environment = fresh_interpreter("robot_io.ur10_child")
     child = subprocess.Popen(
-        [sys.executable, "-m", "robot_io.ur10_child"],
+        command,
+        env=environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=stderr,

@@ -73,12 +73,14 @@ class Run:
         self._files = state / self.mark
         self._files.mkdir(parents=True)
         env = {**os.environ, "XDG_STATE_HOME": str(state), MARK: self.mark, "TMPDIR": str(self._files)}
+        env.setdefault("PYTHONPATH", str(ROOT))
         env.update(popen.pop("env", {}))
         popen.setdefault("stdin", subprocess.DEVNULL)
         with (self._files / "out").open("wb") as out, (self._files / "err").open("wb") as err:
             popen.setdefault("stdout", out)
             popen.setdefault("stderr", err)
-            self.process = subprocess.Popen([*PUSH, *argv], cwd=ROOT, env=env, start_new_session=True, **popen)
+            popen.setdefault("cwd", ROOT)
+            self.process = subprocess.Popen([*PUSH, *argv], env=env, start_new_session=True, **popen)
 
     @property
     def err(self) -> str:

@@ -6,13 +6,13 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 from typing import IO, Any
 
 import msgspec
 from msgspec.structs import replace
 
+from robot_io.process import fresh_interpreter
 from robot_io.status_pipe import StatusReader
 
 MOST_WORDS = 65_536
@@ -100,8 +100,10 @@ def spawn(name: str, module: str, job: msgspec.Struct, fds: list[int]) -> Child:
     """
     listen_fd, status_fd = os.pipe()
     stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it
+    command, environment = fresh_interpreter(module)
     process = subprocess.Popen(
-        [sys.executable, "-m", module],
+        command,
+        env=environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=stderr,

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 from robot_io.errors import EnvironmentFault
+from robot_io.process import fresh_interpreter
 
 TIMEOUT_S = 60.0
 
@@ -22,9 +22,11 @@ class ReportProcess:
     def __init__(self, log: Path, page: Path) -> None:
         """Start it. Raises EnvironmentFault when no process can be started."""
         self.page = page
+        command, environment = fresh_interpreter("tools.report")
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "tools.report", str(log), str(page), str(os.getpid())],
+                [*command, str(log), str(page), str(os.getpid())],
+                env=environment,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,

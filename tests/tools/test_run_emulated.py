@@ -40,14 +40,21 @@ def host():
 
 @pytest.fixture(scope="module")
 def shared_run(state, host, tmp_path_factory):
-    """The run that the first tests look at, with all its defaults but the distance; and its folder."""
+    """The run that the first tests look at, with all its defaults but the distance; and its folder.
+
+    It is started in a folder with packages that are called like ours, as in many a project.
+    """
     found = []
+    elsewhere = tmp_path_factory.mktemp("project")
+    for package in ("tools", "control", "safety"):
+        (elsewhere / package).mkdir()
+        (elsewhere / package / "__init__.py").write_text("raise ImportError('not this one')")
 
     @repeated_when_the_host_stalls
     def push(tmp_path):
         out = tmp_path / "one"
         argv = ("run", "emulated", "--distance-m", str(DISTANCE_M), "--out", str(out), "--json")
-        found[:] = [finished(state, *argv, host=host), out]
+        found[:] = [finished(state, *argv, host=host, cwd=elsewhere), out]
 
     push(tmp_path=tmp_path_factory.mktemp("runs"))
     return found
