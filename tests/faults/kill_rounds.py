@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from tests.host_watch import REPEATS, HostStalled, HostWatch
 from tests.push_runs import QUICK, Ended, Run, stands, started, world_of
 
-PUSHING = r"PUSH .* v 0\.10 m/s"
+PUSHING = r"PUSH +(?!0\.00/)[0-9.]+/.* v 0\.10 m/s"
 STALL_MS = 10.0
 
 
