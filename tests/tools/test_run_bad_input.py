@@ -222,7 +222,7 @@ def test_a_sensor_that_already_streams_beside_an_emulated_arm_and_base(state, tm
     with ft300_process(streaming=True, wrench=(0.5, -1.0, 2.0, 0.0, 0.0, 0.0)) as sensor:
         rig = mixed(tmp_path, "ft", f'port = "{sensor.port}"', "noise_force_N = 0.0")
         settings = ("--set", "path.expected_contact_m=0.0", "--set", "control.lost_rest_s=0.2")
-        quick = [setting.replace("speed_m_per_s=0.1", "speed_m_per_s=0.2") for setting in QUICK]
+        quick = [setting.replace("speed_m_per_s=0.1", "speed_m_per_s=0.14") for setting in QUICK]
         argv = ("run", rig, "--move-robot", *quick, *settings, "--out", str(tmp_path / "out"), "--json")
         ended = finished(state, *argv, host=host)
         assert ended.code == 6, ended.err
