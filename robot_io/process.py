@@ -11,6 +11,7 @@ import os
 import resource
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
@@ -56,6 +57,23 @@ def try_realtime(priority: int) -> bool:
     except OSError:
         return False
     return True
+
+
+@contextlib.contextmanager
+def starting_threads_at(priority: int) -> Iterator[None]:
+    """Let the threads that a library starts in here run under SCHED_FIFO at `priority`, where the system allows it.
+
+    They inherit it; this thread has it only meanwhile.
+    """
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        leave_realtime()
 
 
 def leave_realtime() -> None:

@@ -23,7 +23,13 @@ from robot_io.arm_record import ARM_RECORD_BYTES, ArmError, ArmRecord, pack_arm_
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable, PushError
 from robot_io.messages import LinkState
-from robot_io.process import die_with_parent, forbid_new_descriptors, set_timer_slack_1ns, try_realtime
+from robot_io.process import (
+    die_with_parent,
+    forbid_new_descriptors,
+    set_timer_slack_1ns,
+    starting_threads_at,
+    try_realtime,
+)
 from robot_io.shared_record import SharedRecord
 from robot_io.ur10_preflight import preflight
 from robot_io.ur10_reader import POLL_NS, ArmReader
@@ -41,6 +47,11 @@ _CAUSE = {
     ArmError.SERVO_NOT_HOLDING: "the joints left the held target",
     ArmError.SERVO_STALE: "no new packet for 0.1 s",
 }
+
+RECEIVER_PRIORITY = 60
+"""SCHED_FIFO priority of the wheel's own thread, which starved for 40 ms looks like a controller that stands still.
+
+Below every priority of this program, because that thread is not ours."""
 
 
 class ArmProcess:
@@ -113,7 +124,8 @@ def _sleep_until_next(deadline_ns: int) -> int:
 def hold_arm(job: ArmJob, record: SharedRecord) -> None:
     """Connect, report ready, publish until told to end. Raises DeviceError."""
     info = preflight(job.host)
-    reader = ArmReader(job.host)
+    with starting_threads_at(RECEIVER_PRIORITY if job.realtime_priority > 0 else 0):
+        reader = ArmReader(job.host)
     reader.wait_flowing()
     hold = None
     if job.hold == "servo":
