@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import msgspec
 
-from robot_io.messages import Joints, JointState, LinkState
+from robot_io.messages import Joints, JointState
 
 ZERO_JOINTS: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -96,8 +96,3 @@ def unpack_arm_record(payload: bytes) -> ArmRecord:
     v = _LAYOUT.unpack(payload)
     joints = JointState(v[0:6], v[6:12], v[12], v[13], v[14], v[15], v[16], v[17], v[18])
     return ArmRecord(joints, v[19:25], v[25], v[26], v[27], v[28], v[29], bool(v[30]), v[31])
-
-
-def is_up(record: ArmRecord) -> bool:
-    """Whether the arm's process says its link is up; says nothing about age."""
-    return record.link == LinkState.UP

@@ -8,6 +8,7 @@ Reading accepts only what writing would produce, padding included, and makes not
 from __future__ import annotations
 
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -67,18 +68,18 @@ class Layout:
         return self._build(found), at
 
 
-class _Part:
+class _Part(ABC):
     """Some neighbouring fields of a message; `min_bytes` is the least they can take."""
 
     min_bytes: int
 
+    @abstractmethod
     def writing(self) -> Packed | Written:
         """Return how it is written."""
-        raise NotImplementedError
 
+    @abstractmethod
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         """Append the fields found at `at` to `found`; return where they end."""
-        raise NotImplementedError
 
 
 class _Run(_Part):

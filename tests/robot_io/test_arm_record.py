@@ -2,7 +2,7 @@ import struct
 
 import pytest
 
-from robot_io.arm_record import ARM_RECORD_BYTES, NO_ARM, ArmError, ArmRecord, is_up, pack_arm_record, unpack_arm_record
+from robot_io.arm_record import ARM_RECORD_BYTES, NO_ARM, ArmError, ArmRecord, pack_arm_record, unpack_arm_record
 from robot_io.messages import JointState, LinkState
 from robot_io.shared_record import SharedRecord
 
@@ -49,8 +49,8 @@ def test_a_short_payload_is_refused() -> None:
         unpack_arm_record(pack_arm_record(RECORD)[:-1])
 
 
-def test_the_record_before_the_first_is_not_up_and_infinitely_old() -> None:
-    assert not is_up(NO_ARM)
+def test_the_record_before_the_first_is_closed_and_infinitely_old() -> None:
+    assert NO_ARM.link == LinkState.CLOSED
     assert NO_ARM.published_ns == 0
     assert NO_ARM.changed_ns == 0
     assert unpack_arm_record(pack_arm_record(NO_ARM)) == NO_ARM
