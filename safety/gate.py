@@ -8,6 +8,7 @@ knows nothing of forces or paths, so that nothing up there can be wrong in a way
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import IntEnum
 
 import msgspec
@@ -19,6 +20,8 @@ ZERO = BodyTwist()
 
 FRAME_MAX_AGE_NS = 50_000_000
 """Silence of control for five ticks latches the gate, and so does a frame that is older when it is read."""
+OWN_PAUSE_NS = 100_000_000
+"""A gate that did not run for longer than this latches when it runs again; control has stopped by then."""
 STEP_MARGIN = 1.2
 """A step of the command may exceed the acceleration limit by this much (rounding, lateness)."""
 REPEAT_NS = 18_000_000
@@ -43,6 +46,7 @@ class Latch(IntEnum):
     OVERSPEED = 10
     LINK = 11
     EOF_MOVING = 12
+    PAUSED = 13
 
 
 LATCH_TEXT = {
@@ -59,6 +63,7 @@ LATCH_TEXT = {
     Latch.OVERSPEED: "the base is faster than the envelope",
     Latch.LINK: "the base link is gone",
     Latch.EOF_MOVING: "control died while the base was moving",
+    Latch.PAUSED: "the gate itself was frozen for more than 100 ms",
 }
 
 LATCH_FAULT = {
@@ -67,6 +72,7 @@ LATCH_FAULT = {
     Latch.STALE: "F66",
     Latch.OVERSPEED: "F35",
     Latch.LINK: "F30",
+    Latch.PAUSED: "F67",
 }
 """The row of the fault table that a latch stands for; any other is F36, a command that may not pass."""
 
@@ -104,6 +110,21 @@ def on_frame(limits: GateLimits, state: GateState, frame: GateFrame | None, now_
     if latch or frame is None:
         return latched(state, latch)
     return GateState(Latch.NONE, frame.seq, frame.tick, now_ns, frame.twist, state.sent, state.sent_ns, state.overspeed)
+
+
+def on_frames(limits: GateLimits, state: GateState, frames: Sequence[GateFrame | None], now_ns: int) -> GateState:
+    """Judge all frames that were waiting, oldest first; only the newest must be fresh.
+
+    When the gate itself was held up for a moment, control's older frames waited: that is no fault of theirs.
+    """
+    for frame in frames[:-1]:
+        state = on_frame(limits, state, frame, now_ns if frame is None else min(frame.sent_ns, now_ns))
+    return on_frame(limits, state, frames[-1], now_ns) if frames else state
+
+
+def on_own_pause(state: GateState, pause_ns: int) -> GateState:
+    """Latch when the gate itself did not run for too long: what happened meanwhile it cannot know."""
+    return latched(state, Latch.PAUSED) if pause_ns > OWN_PAUSE_NS else state
 
 
 def on_clock(state: GateState, now_ns: int) -> GateState:

@@ -23,7 +23,7 @@ from robot_io.clock import NS_PER_MS, monotonic_ns
 from robot_io.config import BaseConfig, FramesConfig
 from robot_io.errors import PushError
 from robot_io.event_loop import EventLoop
-from robot_io.gate_frame import FRAME_BYTES, unpack_frame
+from robot_io.gate_frame import FRAME_BYTES, GateFrame, unpack_frame
 from robot_io.gate_log import GateLog
 from robot_io.messages import LinkState, Stamped
 from robot_io.process import set_timer_slack_1ns, try_realtime
@@ -73,6 +73,7 @@ class GateProcess:
         self._loop = EventLoop()
         self._base_fd = -1
         self._end_ns = 0
+        self._clock_ns = 0
 
     def run(self) -> None:
         """Serve until control is gone and the base was told zero."""
@@ -95,27 +96,31 @@ class GateProcess:
         self._loop.remove_fd(fd)
 
     def _on_control(self, _events: int) -> None:
-        while True:
+        self._read_control()
+        self._send_due()
+
+    def _read_control(self) -> None:
+        """Judge every frame that waits; they are read before any silence is judged."""
+        frames: list[GateFrame | None] = []
+        gone = False
+        while not gone and not self._end_ns:
             try:
                 payload = self._control.recv(FRAME_BYTES + 1)
             except BlockingIOError:
                 break
             except OSError:
                 payload = b""
-            if not payload:
-                self._control_is_gone()
-                break
-            now_ns = monotonic_ns()
-            frame = unpack_frame(payload)
-            self._state = gate.on_frame(self._limits, self._state, frame, now_ns)
-            if frame is not None:
-                verdict = self._state.latch
-                self._record = replace(
-                    self._record,
-                    accepted_seq=frame.seq if not verdict else self._record.accepted_seq,
-                    verdict=int(verdict),
-                )
-        self._send_due()
+            if payload:
+                frames.append(unpack_frame(payload))
+            gone = not payload
+        if frames:
+            self._state = gate.on_frames(self._limits, self._state, frames, monotonic_ns())
+            verdict = self._state.latch
+            newest = frames[-1]
+            accepted = newest.seq if newest is not None and not verdict else self._record.accepted_seq
+            self._record = replace(self._record, accepted_seq=accepted, verdict=int(verdict))
+        if gone:
+            self._control_is_gone()
 
     def _control_is_gone(self) -> None:
         self._loop.remove_fd(self._control.fileno())
@@ -127,7 +132,11 @@ class GateProcess:
         self._send_due()
 
     def _on_clock(self, _deadline_ns: int) -> None:
+        self._read_control()
         now_ns = monotonic_ns()
+        if self._clock_ns:
+            self._state = gate.on_own_pause(self._state, now_ns - self._clock_ns)
+        self._clock_ns = now_ns
         self._take(self._base.drain())
         self._state = gate.on_clock(self._state, now_ns)
         if self._base.health().state == LinkState.LOST:

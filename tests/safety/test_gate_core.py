@@ -11,7 +11,19 @@ from robot_io.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
 from safety import gate
 from safety.faults import FAULTS
-from safety.gate import LATCH_FAULT, LATCH_TEXT, GateLimits, GateState, Latch, due, latched, on_clock, on_frame
+from safety.gate import (
+    LATCH_FAULT,
+    LATCH_TEXT,
+    GateLimits,
+    GateState,
+    Latch,
+    due,
+    latched,
+    on_clock,
+    on_frame,
+    on_frames,
+    on_own_pause,
+)
 
 MS = 1_000_000
 T0 = 1_000 * MS
@@ -361,3 +373,28 @@ def test_over_any_sequence_of_events(events, gaps):
     if events and events[-1][0] in ("nonsense", "eof"):
         assert state.latch
         assert not out or due(replace(state, sent_ns=0), now) == ZERO
+
+
+def test_frames_that_waited_for_the_gate_are_judged_and_only_the_newest_must_be_fresh():
+    """The gate was held up for 70 ms; control went on and its frames waited in the socket."""
+    state = ROLLING
+    start_ns = state.frame_ns
+    waiting = [GateFrame(state.seq + n, state.tick + n, start_ns + n * 10 * MS, 2, state.twist) for n in range(1, 8)]
+    now_ns = start_ns + 71 * MS
+    assert on_frame(LIMITS, state, waiting[0], now_ns).latch == Latch.STALE
+    after = on_frames(LIMITS, state, waiting, now_ns)
+    assert after.latch == Latch.NONE
+    assert (after.seq, after.tick, after.frame_ns) == (state.seq + 7, state.tick + 7, now_ns)
+    # A newest frame that is old itself, a missing one, or nonsense among them latches as ever.
+    assert on_frames(LIMITS, state, waiting, now_ns + 51 * MS).latch == Latch.STALE
+    assert on_frames(LIMITS, state, waiting[:3] + waiting[4:], now_ns).latch == Latch.SEQUENCE
+    assert on_frames(LIMITS, state, [waiting[0], None, waiting[1]], now_ns).latch == Latch.NONSENSE
+    assert on_frames(LIMITS, state, [], now_ns) == state
+
+
+def test_a_gate_that_was_frozen_itself_latches():
+    state = ROLLING
+    assert on_own_pause(state, 100 * MS).latch == Latch.NONE
+    frozen = on_own_pause(state, 100 * MS + 1)
+    assert frozen.latch == Latch.PAUSED
+    assert frozen.twist == BodyTwist()
