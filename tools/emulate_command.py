@@ -99,8 +99,8 @@ def stopped_by_signals(loop: EventLoop) -> Iterator[None]:
     """
     read_end, write_end = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     signals = (signal.SIGTERM, signal.SIGINT)
+    before_fd = signal.set_wakeup_fd(write_end)  # first: a signal between the two would be heard by nobody
     before = [signal.signal(number, _note) for number in signals]
-    before_fd = signal.set_wakeup_fd(write_end)
     loop.add_fd(read_end, lambda _: loop.stop())
     try:
         yield

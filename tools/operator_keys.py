@@ -24,8 +24,9 @@ class OperatorKeys:
         self._loop = loop
         self._on_stop, self._on_resume = on_stop, on_resume
         self._pipe = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        self._handlers = [signal.signal(number, _note) for number in SIGNALS]
+        # The pipe first: a signal that came between the two would be heard by nobody.
         self._wakeup = signal.set_wakeup_fd(self._pipe[1])
+        self._handlers = [signal.signal(number, _note) for number in SIGNALS]
         loop.add_fd(self._pipe[0], self._on_signal)
         self._terminal: list[Any] | None = None
         self._stdin = -1

@@ -289,6 +289,7 @@ def test_a_stop_leaves_a_resumable_state_and_no_process(tmp_path, capsys, stop):
     path = tmp_path / "long.toml"
     path.write_text(
         'name = "long"\n[grid]\ny0_m = [0.1, 0.2]\n[random]\nsamples = 400\n[random.ranges]\ns0_m = [0, 0.1]\n'
+        "[time]\nduration_s = 4000.0\nrecord_s = 100.0\n"
     )
     out = tmp_path / "out"
     root = Path(cli.__file__).resolve().parent.parent
