@@ -16,6 +16,7 @@ from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_TIMERSLACK = 29
+_MCL_CURRENT, _MCL_FUTURE = 1, 2
 
 _libc = ctypes.CDLL(None, use_errno=True)
 
@@ -45,6 +46,14 @@ def die_with_parent(parent_pid: int = 0) -> None:
 def set_timer_slack_1ns() -> None:
     """Let timers of this thread fire on time: the default slack lets the kernel delay them by 50 us."""
     _libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+
+
+def lock_memory() -> bool:
+    """Keep all memory of this process, now and later, in RAM: a page fault in the loop can wait for a disk.
+
+    mlockall(2); False when the system does not allow it. Call it after the imports and before the loop.
+    """
+    return int(_libc.mlockall(_MCL_CURRENT | _MCL_FUTURE)) == 0
 
 
 def try_realtime(priority: int) -> bool:

@@ -26,6 +26,7 @@ from robot_io.messages import LinkState
 from robot_io.process import (
     die_with_parent,
     forbid_new_descriptors,
+    lock_memory,
     set_timer_slack_1ns,
     starting_threads_at,
     try_realtime,
@@ -133,6 +134,7 @@ def hold_arm(job: ArmJob, record: SharedRecord) -> None:
     forbid_new_descriptors()  # the wheel's own thread would connect again and restart its script
     gc.freeze()
     gc.disable()
+    lock_memory()
     realtime = job.realtime_priority > 0 and try_realtime(job.realtime_priority)
     process = ArmProcess(job, record, reader, hold)  # publishes the first record
     _report(job, ready_line(info, realtime))

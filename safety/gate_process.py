@@ -26,7 +26,7 @@ from robot_io.event_loop import EventLoop
 from robot_io.gate_frame import FRAME_BYTES, GateFrame, unpack_frame
 from robot_io.gate_log import GateLog
 from robot_io.messages import LinkState, Stamped
-from robot_io.process import set_timer_slack_1ns, try_realtime
+from robot_io.process import lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ridgeback import Ridgeback
 from robot_io.ring import Ring
 from robot_io.shared_record import SharedRecord
@@ -236,6 +236,7 @@ def main() -> int:
     status.say("ready", info=msgspec.to_builtins(info), realtime=realtime)
     gc.collect()
     gc.freeze()
+    lock_memory()
     process.run()
     return 0
 

@@ -17,7 +17,7 @@ from robot_io.base_link import BaseLink
 from robot_io.config import rig_from_toml
 from robot_io.errors import PushError
 from robot_io.ft300 import Ft300
-from robot_io.process import die_with_parent, set_timer_slack_1ns, try_realtime
+from robot_io.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ring import Ring
 from robot_io.status_pipe import StatusPipe
 from robot_io.ur10 import ArmLink
@@ -72,6 +72,7 @@ def main() -> int:
     gc.collect()
     gc.freeze()
     gc.disable()
+    lock_memory()
     loop.run()
     base.close()  # first of all: the gate takes the EOF for the end and sends its last zeros
     gc.enable()

@@ -19,7 +19,7 @@ from robot_io.clock import NS_PER_MS, monotonic_ns
 from robot_io.config import rig_from_toml
 from robot_io.errors import PushError
 from robot_io.event_loop import EventLoop
-from robot_io.process import set_timer_slack_1ns, try_realtime
+from robot_io.process import lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ring import Ring
 from robot_io.status_pipe import StatusPipe
 from sim_backend.world import World
@@ -87,6 +87,7 @@ def main() -> int:
     status.say("ready", endpoints=[endpoint(emulator) for emulator in opened], realtime=try_realtime(PRIORITY))
     gc.collect()
     gc.freeze()
+    lock_memory()
     loop.run()
     for emulator in opened:
         emulator.close()
