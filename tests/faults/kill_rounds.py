@@ -34,6 +34,8 @@ class Round(NamedTuple):
     stall_ms: float
     gone_ms: float
     last_state_ms: float
+    struck_ns: int
+    """When the signal was sent, CLOCK_MONOTONIC."""
 
 
 @contextlib.contextmanager
@@ -61,7 +63,7 @@ def strike(
         run.wait_gone(3.0)
         gone_ms = (time.monotonic_ns() - at_ns) / 1e6
     if not (folder / log).exists():
-        return Round(ended, folder, None, None, stall_ms, gone_ms, 0.0)
+        return Round(ended, folder, None, None, stall_ms, gone_ms, 0.0, at_ns)
     commands, wheels = world_of(folder / log)
     moving = [twist for t_ns, twist in wheels if t_ns <= at_ns]
     assert moving, "the base was not yet there"
@@ -76,6 +78,7 @@ def strike(
         stall_ms,
         gone_ms,
         (wheels[-1][0] - at_ns) / 1e6,
+        at_ns,
     )
 
 
