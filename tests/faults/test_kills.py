@@ -28,8 +28,7 @@ REST_MS = 60.0
 GATE_GONE_REST_MS = 330.0
 """The base's own timeout of 0.25 s and its tick, 29 ticks of 10 ms, and 4 more per 0.1 m/s."""
 ARM_GONE_ZERO_MS = 30.0
-"""One tick, and two on the wire, after its end. That takes a while: the wheel's threads wait for a processor as others
-do before the kernel calls the process ended. By the age of its record alone it would be 100 ms."""
+"""One tick, and two on the wire."""
 AGAIN = 8
 
 
