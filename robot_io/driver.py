@@ -2,8 +2,8 @@
 
 `open` identifies the device, or raises a `DeviceError` within a named time. `start` begins the flow. `drain`
 returns all new samples since the last call, oldest first, bounded, and never blocks and never raises on
-link loss (it gives nothing, and `health` says LOST). `stop` and `close` are idempotent, bounded and never
-raise. A driver stamps arrivals; it never judges staleness and never resumes motion by itself.
+link loss (it gives what came before, then nothing, and `health` says LOST). `stop` and `close` are idempotent,
+bounded and never raise. A driver stamps arrivals; it never judges staleness and never resumes motion by itself.
 """
 
 from __future__ import annotations

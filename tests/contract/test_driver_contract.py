@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from robot_io.clock import monotonic_ns
 from robot_io.errors import DeviceError
 from robot_io.messages import BodyTwist, DeviceHealth, DeviceInfo, LinkState, Stamped
 from tests.contract.levels import DEVICES, Simulated, emulated, hardware
@@ -191,6 +192,9 @@ def test_a_lost_link_is_said_and_never_raised(level_name, device):
                 level.let_pass(SLOW_S)
                 driver.drain()
             assert driver.health().cause
+            noticed_ns = monotonic_ns()
+            came_before = driver.drain()
+            assert all(sample.received_ns <= noticed_ns for sample in came_before)
             assert driver.drain() == ()
             if device == "ridgeback":
                 assert driver.command(BASE_FORWARD) == BodyTwist(), "nothing was sent"
