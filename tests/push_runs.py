@@ -109,10 +109,8 @@ class Run:
         return Ended(code, (self._files / "out").read_text(errors="replace"), self.err)
 
     def _blame_the_host(self, code: int) -> None:
-        if code == SAFETY_STOP and self._host is not None:
-            stall_ms = self._host.worst_ms(self._began_ns, time.monotonic_ns())
-            if stall_ms > SPOILING_MS:
-                raise HostStalled(f"a processor stood still for {stall_ms:.0f} ms: {self.err[-300:]}")
+        if self._host is not None:
+            blame_the_host(self._host, self._began_ns, code, self.err)
 
     def alive(self) -> dict[int, str]:
         """Return the processes of this run that are left (zombies are not counted), by pid."""
@@ -141,6 +139,13 @@ class Run:
         for pid in self.alive():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
+
+
+def blame_the_host(host: HostWatch, began_ns: int, code: int, err: str) -> None:
+    """Raise HostStalled when a program ended in a safety stop and a processor has stood still meanwhile."""
+    stall_ms = host.worst_ms(began_ns, time.monotonic_ns()) if code == SAFETY_STOP else 0.0
+    if stall_ms > SPOILING_MS:
+        raise HostStalled(f"a processor stood still for {stall_ms:.0f} ms: {err[-300:]}")
 
 
 @contextlib.contextmanager

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any
 from robot_io.error_report import say_json, tell
 from sim_backend.lanes import Lane, Timing, simulate_lane
 from sim_backend.slider_exact import solve_exact
-from tools.study_paper import paper_study
-from tools.sweep_engine import default_workers, run_items
-from tools.sweep_grid import lane_of
-from tools.sweep_items import cut, run_lane_item
+from tools.study.engine import default_workers, run_items
+from tools.study.grid import lane_of
+from tools.study.items import cut, run_lane_item
+from tools.study.paper import paper_study
 
 if TYPE_CHECKING:
     import numpy as np

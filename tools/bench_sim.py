@@ -22,10 +22,10 @@ from robot_io.error_report import say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.mcap_read import read_summary
 from robot_io.tick import TICK_CDR, ControlTick
-from tools.lockstep import Lockstep, open_log
+from tools.log.tick_topics import TickTopics
 from tools.rig import resolve_rig
-from tools.tick_core import TickCore
-from tools.tick_topics import TickTopics
+from tools.run.lockstep import Lockstep, open_log
+from tools.run.tick_core import TickCore
 
 ROUNDS = 5
 """The best of so many rounds counts."""

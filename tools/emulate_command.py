@@ -25,8 +25,8 @@ from sim_backend.rosbridge_standalone import standalone_emulator
 from sim_backend.ur_emulator import UrEmulator
 from sim_backend.ur_standalone import StillArm
 from sim_backend.world import World
-from tools.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
 from tools.rig import resolve_rig
+from tools.run.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
 
 ARM_HOST = "127.0.0.10"
 BASE_HOST = "127.0.0.1"

@@ -22,14 +22,14 @@ from robot_io.errors import OperatorStop, PushError, SafetyStop
 from robot_io.event_loop import EventLoop
 from robot_io.process import leave_realtime, try_realtime
 from safety.gate import Latch
-from tools import run_dir
-from tools.aftermath import figures_of
-from tools.children import Child
-from tools.live_line import LiveLine
-from tools.operator_keys import OperatorKeys
-from tools.processes import Processes
-from tools.saved_tare import SavedTare
-from tools.start_errors import combined, not_in_time
+from tools.run import run_dir
+from tools.run.aftermath import figures_of
+from tools.run.children import Child
+from tools.run.live_line import LiveLine
+from tools.run.operator_keys import OperatorKeys
+from tools.run.processes import Processes
+from tools.run.saved_tare import SavedTare
+from tools.run.start_errors import combined, not_in_time
 
 PRIORITY = 1
 """Below all others of the run. Not for its work: a process that is killed needs the processor to die, and the base is

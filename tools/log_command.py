@@ -19,7 +19,8 @@ from robot_io.error_report import SCHEMA, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.mcap_read import LogSummary, read_summary
 from robot_io.mcap_recover import recover
-from tools.log_decode import Decoders, columns
+from tools.log.decode import Decoders, columns
+from tools.log.find import find_log
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     export = actions.add_parser("export", help="one CSV file per topic, units in the head line")
     saved = actions.add_parser("recover", help="make a whole log of a truncated one")
     for action in (info, cat, export, saved):
-        action.add_argument("log", type=Path, help="the .mcap file")
+        action.add_argument("log", type=Path, help="run.mcap, or a run's folder")
         action.add_argument("--json", action="store_true", help="one JSON object on stdout, last")
     for action in (cat, export):
         action.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these topics")
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it; raises UsageError, EnvironmentFault or LogDamaged."""
+    args.log = find_log(args.log)
     actions = {"info": _info, "cat": _cat, "export": _export, "recover": _recover}
     facts = actions[args.action](args)
     if args.json:

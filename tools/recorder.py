@@ -29,7 +29,7 @@ from robot_io.clock import NS_PER_MS, monotonic_ns, wall_offset_ns
 from robot_io.errors import LogDamaged, PushError
 from robot_io.event_loop import HANGUP, READ, EventLoop
 from robot_io.ring import Ring
-from tools.run_log import RunLog
+from tools.log.run_log import RunLog
 
 POLL_NS = 20 * NS_PER_MS
 FLUSH_NS = 250 * NS_PER_MS

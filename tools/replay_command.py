@@ -10,11 +10,12 @@ from typing import Any
 from robot_io.config import rig_from_toml, rig_to_toml
 from robot_io.error_report import say_json, tell
 from robot_io.errors import ReplayDiffers, UsageError
-from tools.replay import ReplayResult, replay
-from tools.replay_difference import Difference
-from tools.run_facts import program_and_machine
-from tools.tick_core import TickCore
-from tools.verified_log import VerifiedLog
+from tools.log.find import find_log
+from tools.replay.difference import Difference
+from tools.replay.fold import ReplayResult, replay
+from tools.replay.verified_log import VerifiedLog
+from tools.run.run_facts import program_and_machine
+from tools.run.tick_core import TickCore
 
 DIFFERS = ReplayDiffers.exit_code
 
@@ -31,11 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay; 0 identical, 7 different. Raises LogDamaged (8) for a log that cannot be trusted."""
-    path = Path(args.log)
-    if path.is_dir():
-        path = path / "run.mcap"
-        if not path.exists():
-            raise UsageError("there is no run.mcap in this folder", where=args.log, do="Name the log itself")
+    path = find_log(Path(args.log))
     if args.tolerance is not None and not args.tolerance >= 0.0:
         raise UsageError(f"--tolerance {args.tolerance} is not a distance", where="push replay", do="Give 0 or more")
     if args.what_if:

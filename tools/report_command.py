@@ -7,6 +7,7 @@ from pathlib import Path
 
 from robot_io.error_report import SCHEMA, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
+from tools.log.find import find_log
 
 PNG_NAMES = ("trajectory", "force", "speed", "tracking", "timing", "safety")
 
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write it. Raises UsageError, LogDamaged, EnvironmentFault."""
-    logs = [log / "run.mcap" if log.is_dir() else log for log in args.log]
+    logs = [find_log(log) for log in args.log]
     if args.compare is not None:
         written = compare(logs, args)
     elif len(logs) > 1:
@@ -39,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
 def one(log: Path, args: argparse.Namespace) -> list[Path]:
     """Write report.html, and with --png the figures; return what was written."""
-    from tools.report import write_report
+    from tools.report.page import write_report
 
     out: Path = args.out or log.parent
     try:
@@ -61,7 +62,7 @@ def one(log: Path, args: argparse.Namespace) -> list[Path]:
 
 def compare(logs: list[Path], args: argparse.Namespace) -> list[Path]:
     """Draw the plan view of all logs; return what was written."""
-    from tools.plan_view import write_compare
+    from tools.report.plan_view import write_compare
 
     if args.out is not None or args.png:
         raise UsageError(

@@ -10,15 +10,15 @@ from robot_io.config import RigConfig
 from robot_io.error_report import say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.tick import TickInput, TickOutput, TickState
-from tools import run_dir, saved_tare, verdict
-from tools.gain_warning import gain_warning
-from tools.live_line import LiveLine
-from tools.report_process import ReportProcess
+from tools.report.process import ReportProcess
 from tools.rig import devices_at, resolve_rig
-from tools.run_facts import level_of
-from tools.run_state import status_line
-from tools.saved_tare import SavedTare
-from tools.state_dir import RigLock
+from tools.run import run_dir, saved_tare, verdict
+from tools.run.gain_warning import gain_warning
+from tools.run.live_line import LiveLine
+from tools.run.run_facts import level_of
+from tools.run.run_state import status_line
+from tools.run.saved_tare import SavedTare
+from tools.run.state_dir import RigLock
 
 LARGEST_SEED = 2**63 - 1
 """What the log can hold."""
@@ -156,7 +156,7 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Saved
 
 def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
     """Run level sim in this process and return its summary."""
-    from tools.lockstep import Lockstep, WallPace, open_log, stop_on_signals
+    from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
     text = run_dir.write_config(out, rig)
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)

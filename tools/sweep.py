@@ -13,10 +13,10 @@ from typing import Any
 
 from robot_io.error_report import say_json, tell
 from robot_io.errors import OperatorStop, UsageError
-from tools.study_paper import paper_study
-from tools.sweep_engine import default_workers, engine, run_items
-from tools.sweep_grid import load_grid
-from tools.sweep_plan import Plan, hardware_plan, lanes_plan
+from tools.study.engine import default_workers, engine, run_items
+from tools.study.grid import load_grid
+from tools.study.paper import paper_study
+from tools.study.plan import Plan, hardware_plan, lanes_plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study and write its results; return the exit code."""
-    from tools.sweep_store import Store, fingerprint
+    from tools.study.store import Store, fingerprint
 
     began = time.monotonic()
     plan = _plan(args)

@@ -27,7 +27,7 @@ from sim_backend.gain_limits import (
     sticking_limit,
 )
 from sim_backend.slider import Circle, Rectangle, SliderModel, pressure_distance_m
-from tools.tune_map import PRESETS
+from tools.study.tune_map import PRESETS
 
 SAMPLES = 5
 """Sizes and widths taken from a range, its ends among them."""
@@ -149,7 +149,7 @@ def _body(outline: Circle | Rectangle, pressure: Any, length: float, args: argpa
 
 def check(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
     """Find the limit of the sliders that bind, one a formula, by simulation; return both and their difference."""
-    from tools.gain_check import simulated_limit
+    from tools.study.gain_check import simulated_limit
 
     formulas: dict[str, Callable[[PushedBody, float], float]] = {
         "sticking": sticking_limit,
@@ -203,8 +203,8 @@ def _tell(result: dict[str, Any], args: argparse.Namespace) -> None:
 
 
 def _draw(bodies: Sequence[PushedBody], recommended: tuple[float, float], what: str, out: Path) -> list[str]:
-    from tools.sweep_figures import save
-    from tools.tune_map import draw
+    from tools.study.figures import save
+    from tools.study.tune_map import draw
 
     return save(draw([(f, limit(bodies, f)) for f in MAP_K_F], recommended, what), out, "gain_map")
 

@@ -17,7 +17,7 @@ from safety import gate
 from safety.gate import GateLimits, GateState
 from sim_backend.world import World
 from tools.rig import resolve_rig
-from tools.tick_core import TickCore
+from tools.run.tick_core import TickCore
 
 START_NS = 1_000_000_000
 PERIOD_NS = 10_000_000

@@ -10,7 +10,7 @@ from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ControlState, Mode, Operator, Phase, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing
 from tests.safety.fold_bench import without_contact as no_force
-from tools.tick_core import TickCore
+from tools.run.tick_core import TickCore
 
 
 def resume(inp, _=0):
@@ -499,7 +499,7 @@ def test_an_approach_that_was_held_ramps_up_again():
 
 
 def test_the_message_of_a_tick_holds_all_of_it():
-    from tools.tick_core import tick_message
+    from tools.run.tick_core import tick_message
 
     bench = pushing()
     before = bench.state

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
 import shlex
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from tests.host_watch import HostWatch, repeated_when_the_host_stalls
+from tests.push_runs import blame_the_host
 from tools.fault_table import table
 from tools.rig_reference import reference
 
@@ -44,6 +48,8 @@ def readme_commands():
                 yield command
 
 
+@pytest.mark.timeout(300)
+@repeated_when_the_host_stalls
 def test_readme_shell_blocks_run(tmp_path):
     """Every command of the README in order, in an empty folder; make targets are looked up, not run again."""
     environment = os.environ | {
@@ -52,15 +58,18 @@ def test_readme_shell_blocks_run(tmp_path):
     }
     commands = list(readme_commands())
     assert any(command.startswith("make demo") for command in commands)
-    for command in commands:
-        if command.startswith("make "):
-            subprocess.run(["make", "-n", *shlex.split(command)[1:]], cwd=ROOT, check=True, capture_output=True)
-            continue
-        done = subprocess.run(
-            ["bash", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=80,
-            stdin=subprocess.DEVNULL, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, f"{command}: {done.stderr[-500:]}"
+    with contextlib.closing(HostWatch()) as host:
+        for command in commands:
+            if command.startswith("make "):
+                subprocess.run(["make", "-n", *shlex.split(command)[1:]], cwd=ROOT, check=True, capture_output=True)
+                continue
+            began_ns = time.monotonic_ns()
+            done = subprocess.run(
+                ["bash", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=80,
+                stdin=subprocess.DEVNULL, check=False,
+            )  # fmt: skip
+            blame_the_host(host, began_ns, done.returncode, done.stderr)
+            assert done.returncode == 0, f"{command}: {done.stderr[-500:]}"
     assert (tmp_path / "runs/first/run.mcap").exists()
     assert (tmp_path / "runs/six/summary.json").exists()
 

@@ -161,8 +161,8 @@ def test_all_devices_gone_at_once(state, tmp_path, host):
 
 BROKEN_FOLD = """
 import sys
-if "tools.control_process" in sys.orig_argv:
-    from tools.tick_core import TickCore
+if "tools.run.control_process" in sys.orig_argv:
+    from tools.run.tick_core import TickCore
     fold = TickCore.fold
     def broken(self, state, inp):
         if state.control.progress_m > 0.1 and not inp.host.loop_error:
@@ -204,9 +204,9 @@ def test_an_exception_in_the_loop(state, tmp_path, host):
 
 ENDLESS_FOLD = """
 import sys
-if "tools.control_process" in sys.orig_argv:
+if "tools.run.control_process" in sys.orig_argv:
     from msgspec.structs import replace
-    from tools.tick_core import TickCore
+    from tools.run.tick_core import TickCore
     fold = TickCore.fold
     def endless(self, state, inp):
         after, output = fold(self, state, inp)

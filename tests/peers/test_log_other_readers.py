@@ -32,7 +32,7 @@ from robot_io.tick import (
     TickOutput,
     TickState,
 )
-from tools.run_log import RunLog
+from tools.log.run_log import RunLog
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(600)]
 TICKS = 1000

@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import pytest
 
 from robot_io.tick import TICK_CDR, ControlTick, Phase
-from tests.replay.runs import push, ticks_in
-from tools.run_log import RunLog
-
-QUICK = (
-    *("--set", "ft.tare_seconds_s=0.3"),
-    *("--set", "control.approach_speed_m_per_s=0.1"),
-    *("--set", "control.ramp_s=0.3"),
-    *("--set", "control.retreat_m=0.0"),
-)
-"""Less waiting around the push."""
+from tests.host_watch import HostWatch, repeated_when_the_host_stalls
+from tests.push_runs import QUICK, finished
+from tests.replay.runs import ticks_in
+from tools.log.run_log import RunLog
 
 
-def short_push(tmp_path_factory: pytest.TempPathFactory, *words: str) -> Path:
-    folder = tmp_path_factory.mktemp("push")
+def short_push(folder: Path, *words: str, host: HostWatch | None = None) -> Path:
     out = folder / "run"
-    done = push("run", *words, *QUICK, "--distance-m", "0.2", "--out", out, "--no-report", state=folder / "state")
-    assert done.returncode == 0, done.stderr
+    argv = ("run", *words, *QUICK, "--distance-m", "0.2", "--out", str(out))
+    done = finished(folder / "state", *argv, host=host)
+    assert done.code == 0, done.err
     return out
 
 
 @pytest.fixture(scope="session")
 def sim_run(tmp_path_factory) -> Path:
-    return short_push(tmp_path_factory, "sim", "--fast")
+    return short_push(tmp_path_factory.mktemp("push"), "sim", "--fast")
 
 
 @pytest.fixture(scope="session")
 def emulated_run(tmp_path_factory) -> Path:
-    return short_push(tmp_path_factory, "emulated")
+    found = []
+
+    @repeated_when_the_host_stalls
+    def run(tmp_path):
+        found.append(short_push(tmp_path, "emulated", host=host))
+
+    with contextlib.closing(HostWatch()) as host:
+        run(tmp_path=tmp_path_factory.mktemp("push"))
+    return found[-1]
 
 
 @pytest.fixture(scope="session")

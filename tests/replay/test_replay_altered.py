@@ -16,9 +16,9 @@ from robot_io.messages import BodyTwist, LinkState, Pose2D, WorldTwist
 from robot_io.tick import ControlTick, Operator
 from robot_io.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from tests.replay.runs import Messages, changed, places, replayed, rewritten, with_input
-from tools import verified_log
 from tools.cli import main
-from tools.replay import replay
+from tools.replay import verified_log
+from tools.replay.fold import replay
 
 DIFFERS, DAMAGED = 7, 8
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from tests.replay.runs import replayed, rewritten, ticks_in
 from tools.cli import main
-from tools.replay_difference import difference
+from tools.replay.difference import difference
 
 
 def test_ticks_that_did_not_fit_into_the_ring_are_a_counted_gap(sim_ticks, pushing_at, write_log, tmp_path, capsys):

@@ -17,7 +17,7 @@ from robot_io.base_record import BaseRecord
 from robot_io.messages import BaseStatus, BodyTwist, JointState, Pose2D
 from robot_io.tick import FtInput, FtReading, HostInput, Phase, TickInput, TickOutput, TickState
 from tools.rig import resolve_rig
-from tools.tick_core import TickCore
+from tools.run.tick_core import TickCore
 
 PERIOD_NS = 10_000_000
 START_NS = 5_000_000_000

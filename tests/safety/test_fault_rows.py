@@ -6,7 +6,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-import tools.tick_core
+import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
 from safety import arm_checks, base_checks, host_checks, sensor_checks, supervisor, task_checks
@@ -180,7 +180,7 @@ def without_check(row: str, module: str, index: int):
 def test_without_its_check_a_row_goes_unnoticed(row, module, index, monkeypatch):
     blind = without_check(row, module, index)
     if module == "safety.supervisor":
-        monkeypatch.setattr(tools.tick_core, "supervise", blind.supervise)
+        monkeypatch.setattr(tools.run.tick_core, "supervise", blind.supervise)
     else:
         monkeypatch.setattr(CHECKS[module], "check", blind.check)
     scenarios = [s for s in SCENARIOS if s.row == row]

@@ -13,7 +13,7 @@ from sim_backend.gain_limits import (
     offset_per_newton_m,
     sticking_limit,
 )
-from tools.gain_check import growth_rate, simulated_limit
+from tools.study.gain_check import growth_rate, simulated_limit
 
 SQUARE_D = (math.sqrt(2) + math.asinh(1)) / 6
 BOX = PushedBody(round=False, rho_m=0.2, d_m=0.153, ball_radius_m=0.05, shift_m=0.045)

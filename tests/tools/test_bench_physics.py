@@ -9,8 +9,8 @@ import pytest
 from sim_backend.batch import STATISTICS, parameters, run_arrays
 from sim_backend.lanes import Timing
 from tools import bench_physics, cli
-from tools.study_paper import paper_study
-from tools.sweep_grid import lane_of
+from tools.study.grid import lane_of
+from tools.study.paper import paper_study
 
 
 def test_the_c_twin_computes_the_same(tmp_path):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tools.bounded_series import Series, Tally
+from tools.report.bounded_series import Series, Tally
 
 
 def test_a_series_below_its_limit_keeps_every_row():

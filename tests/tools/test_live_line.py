@@ -9,7 +9,7 @@ import time
 
 from robot_io.config import load_rig
 from safety.faults import FAULTS
-from tools.live_line import LiveLine
+from tools.run.live_line import LiveLine
 
 STATUS = {
     "tick": 100,

@@ -17,7 +17,7 @@ from robot_io.mcap_read import read_log, read_summary
 from robot_io.tick import TICK_CDR
 from robot_io.world_messages import STATE_CDR
 from tests.replay.runs import PUSH, ROOT, push
-from tools.lockstep import WallPace
+from tools.run.lockstep import WallPace
 
 SHORT = ("run", "sim", "--fast", "--distance-m", "0.1", "--no-report")
 

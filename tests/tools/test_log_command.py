@@ -42,6 +42,21 @@ def log(tmp_path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("action", ["info", "cat", "export"])
+def test_a_run_s_folder_names_its_log(log, capsys, action):
+    assert main(["log", action, str(log.parent), "--json"]) == 0
+    assert last_json(capsys)["log"] == str(log)
+
+
+@pytest.mark.parametrize("action", ["info", "cat", "export", "recover"])
+def test_a_folder_without_a_run_is_one_sentence(tmp_path, capsys, action):
+    assert main(["log", action, str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert "no run.mcap in this folder" in told
+    assert told.count("\n") <= 2
+    assert list(tmp_path.iterdir()) == []
+
+
 def last_json(capsys) -> dict:
     return json.loads(capsys.readouterr().out.splitlines()[-1])
 

@@ -21,12 +21,13 @@ from robot_io.log_channels import Kind
 from robot_io.mcap_read import read_log, read_summary
 from robot_io.mcap_recover import recover
 from robot_io.tick import TICK_CDR, ControlTick, Phase
-from tools import report_process, run_command
+from tools import run_command
 from tools.cli import main
-from tools.report import page, run_mark, write_report
-from tools.report_words import baseline_of, differences, tiles, verdict
-from tools.run_data import read_run
-from tools.run_log import RunLog
+from tools.log.run_log import RunLog
+from tools.report import process as report_process
+from tools.report.page import page, run_mark, write_report
+from tools.report.run_data import read_run
+from tools.report.words import baseline_of, differences, tiles, verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 EVIL = "<script>alert(1)</script>\"'&$(x) \\frac{ \x1b[31m"
@@ -193,7 +194,7 @@ def test_a_hardware_log_without_a_world_and_with_hostile_names(ran, ticks, tmp_p
 def test_a_summary_that_is_none_changes_nothing(ran, ticks, tmp_path, beside):
     log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), ticks[:5])
     (tmp_path / "summary.json").write_text(beside)
-    from tools.report import read_summary_file
+    from tools.report.page import read_summary_file
 
     text = page(read_run(log), read_summary_file(tmp_path / "summary.json"), {}, "0")
     assert "<h3>ft300</h3>" in text

@@ -14,7 +14,7 @@ from robot_io.messages import BodyTwist, Pose2D
 from robot_io.ros_messages import POSE_STAMPED, TF_MESSAGE, Header, PoseStamped, planar_pose, ros_time
 from robot_io.tick_chain import TickChain
 from robot_io.world_messages import STATE_CDR, WorldState
-from tools.run_log import RunLog
+from tools.log.run_log import RunLog
 
 STATE = STATE_CDR.encode(
     WorldState(0, Pose2D(), BodyTwist(), Pose2D(1.0, 2.0, 0.5), 15.0, 0.0, 0.9, 2.0, 1),

@@ -11,8 +11,9 @@ import pytest
 
 from robot_io.config import load_rig
 from robot_io.errors import EnvironmentFault, UsageError
-from tools import run_command, run_dir
-from tools.state_dir import RigLock, state_dir
+from tools import run_command
+from tools.run import run_dir
+from tools.run.state_dir import RigLock, state_dir
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -64,7 +65,7 @@ def test_discard_takes_only_what_is_of_the_run(tmp_path):
 
 HOLDER = """
 import sys
-from tools.state_dir import RigLock
+from tools.run.state_dir import RigLock
 with RigLock(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.read()

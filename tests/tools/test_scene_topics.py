@@ -11,7 +11,7 @@ import pytest
 
 from robot_io.config import load_rig
 from robot_io.ros_messages import PATH, STRING, TF_MESSAGE
-from tools.scene_topics import _quaternion, scene_messages, urdf
+from tools.log.scene_topics import _quaternion, scene_messages, urdf
 
 
 def rotate(q, v):

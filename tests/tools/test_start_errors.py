@@ -10,8 +10,8 @@ import tempfile
 import pytest
 
 from robot_io.errors import ConfigError, DeviceError, EnvironmentFault, PushError
-from tools.children import Child
-from tools.start_errors import combined, not_in_time
+from tools.run.children import Child
+from tools.run.start_errors import combined, not_in_time
 
 
 @pytest.fixture

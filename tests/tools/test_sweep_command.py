@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from robot_io.errors import PushError
-from tools import cli, sweep_items
-from tools.sweep_engine import run_items
-from tools.sweep_items import COLUMNS
+from tools import cli
+from tools.study import items as sweep_items
+from tools.study.engine import run_items
+from tools.study.items import COLUMNS
 
 GRID = """
 name = "small"
@@ -116,13 +117,13 @@ def test_one_and_more_workers_and_an_interruption_give_the_same_bytes(tmp_path, 
             raise KeyboardInterrupt
         return real(item)
 
-    monkeypatch.setattr("tools.sweep_plan.run_lane_item", interrupted)
+    monkeypatch.setattr("tools.study.plan.run_lane_item", interrupted)
     code, _, err = push(capsys, grid, "--out", tmp_path / "cut", "--workers", 1)
     assert code == 130
     assert "4 of 9 cases done" in err
     assert "--resume" in err
     assert not (tmp_path / "cut" / "results.csv").exists()
-    monkeypatch.setattr("tools.sweep_plan.run_lane_item", real)
+    monkeypatch.setattr("tools.study.plan.run_lane_item", real)
     code, _, err = push(capsys, grid, "--out", tmp_path / "cut", "--workers", 1, "--resume")
     assert code == 0
     assert "2 of 5 parts are done already" in err

@@ -6,9 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from tools import cli, study_hardware
-from tools.hardware_summary import summarise_hardware
-from tools.study_hardware import hardware_items, rig_of, run_hardware_item
+from tools import cli
+from tools.study import hardware as study_hardware
+from tools.study.hardware import hardware_items, rig_of, run_hardware_item
+from tools.study.hardware_summary import summarise_hardware
 
 
 def test_ten_pushes_by_the_law_and_five_of_their_starts_open_loop():

@@ -7,7 +7,7 @@ import pytest
 from robot_io.config import load_rig
 from sim_backend.gain_limits import PushedBody, fast_loop_k_f, limit
 from tools import cli
-from tools.gain_warning import gain_warning
+from tools.run.gain_warning import gain_warning
 
 
 def tune(capsys, *argv):

@@ -1,0 +1,121 @@
+"""The log of one run as the recorder and level `sim` write it: ring records in, topics out.
+
+The control tick is chained and written as it is, then the topics people plot are derived from it; every other kind
+is written as it comes. Topics are declared when they are first used.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robot_io.config import rig_from_toml
+from robot_io.errors import LogDamaged
+from robot_io.log_channels import BY_TOPIC, CHANNELS, Kind
+from robot_io.log_seal import LogSeal
+from robot_io.mcap_log import McapLog
+from robot_io.ros_messages import POSE_STAMPED, planar_pose
+from robot_io.tick import TICK_CDR, ControlTick
+from robot_io.tick_chain import TickChain
+from robot_io.world_messages import STATE_CDR
+from tools.log.scene_topics import scene_messages, slider_frame, slider_pose
+from tools.log.tick_topics import Message, TickTopics
+
+OFFSET_FACT = "wall_offset_ns"
+
+
+class RunLog:
+    """One part of a run's log.
+
+    config_text: the resolved rig. wall_offset_ns: added to every time of a record to get its log time; it is noted
+    among `metadata`. Raises as `McapLog` and `rig_from_toml`; OSError when the disk fails while writing.
+    """
+
+    def __init__(self, path: Path, *, config_text: str, metadata: dict[str, str], wall_offset_ns: int) -> None:
+        rig = rig_from_toml(config_text)
+        self._offset_ns = wall_offset_ns
+        self._log = McapLog(path, config_text=config_text, metadata={**metadata, OFFSET_FACT: str(wall_offset_ns)})
+        self._declared: set[str] = set()
+        self._rig = rig
+        self._scene_written = False
+        self._topics = TickTopics(wall_offset_ns)
+        # With motion capture of the object its pose is what was seen, else it is the world's truth.
+        self._slider_is_seen = bool(rig.base.topics.slider_pose) and rig.base.level != "sim"
+        self._seal = LogSeal()
+        self.chain = TickChain()
+        self.undecodable = 0
+        self.unknown_kinds = 0
+
+    @property
+    def messages(self) -> int:
+        """How many messages were written, derived ones included."""
+        return self._log.messages
+
+    def record(self, kind: int, time_ns: int, payload: bytes) -> None:
+        """Write one ring record and what is derived from it. Raises OSError when the disk fails."""
+        if kind == Kind.CONTROL_TICK:
+            try:
+                tick = TICK_CDR.decode(payload)
+            except LogDamaged:
+                tick = None
+            self.tick(time_ns, payload, tick)
+        elif kind in CHANNELS:
+            self._write(Message(CHANNELS[kind].topic, time_ns + self._offset_ns, payload))
+            if kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
+                self._slider(kind, time_ns, payload)
+        else:
+            self.unknown_kinds += 1
+
+    def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
+        """Chain and write one tick; `tick` is the message of `payload` (None: it cannot be decoded)."""
+        self._write(Message("/control/tick", time_ns + self._offset_ns, self.chain.link(payload)))
+        if tick is None:
+            self.undecodable += 1
+            return
+        for derived in self._topics.expand(tick):
+            self._write(derived)
+
+    def flush(self) -> None:
+        """Hand everything to the operating system."""
+        self._log.flush()
+
+    def finish(self, facts: dict[str, str]) -> None:
+        """Close the log with the facts known only now; idempotent."""
+        own = {
+            **self._seal.facts(),
+            "ticks": str(self.chain.ticks),
+            "last_tick_crc32": f"{self.chain.crc32:08x}",
+            "undecodable": str(self.undecodable),
+            "unknown_kinds": str(self.unknown_kinds),
+        }
+        self._log.finish({**own, **facts})
+
+    def abandon(self) -> None:
+        """Close the file as it is, after an error of the disk; never raises."""
+        self._log.abandon()
+
+    def _write(self, message: Message) -> None:
+        if not self._scene_written:
+            self._scene_written = True  # now, because only the first record says when the log starts
+            for first in scene_messages(self._rig, message.log_time_ns):
+                self._write(first)
+        if message.topic not in self._declared:
+            self._declared.add(message.topic)
+            channel = BY_TOPIC[message.topic]
+            self._log.channel(channel.topic, channel.cdr_type, latched=channel.latched)
+        self._seal.note(message.topic, message.payload)
+        self._log.write(message.topic, message.log_time_ns, message.payload)
+
+    def _slider(self, kind: int, time_ns: int, payload: bytes) -> None:
+        if (kind == Kind.SLIDER_POSE) != self._slider_is_seen:
+            return
+        log_time_ns = time_ns + self._offset_ns
+        try:
+            if kind == Kind.SLIDER_POSE:
+                pose = POSE_STAMPED.decode(payload).pose
+            else:
+                truth = STATE_CDR.decode(payload).slider
+                pose = planar_pose(truth.x, truth.y, truth.yaw)
+                self._write(slider_pose(pose, log_time_ns))
+            self._write(slider_frame(pose, log_time_ns))
+        except LogDamaged:
+            self.undecodable += 1

@@ -1,0 +1,254 @@
+"""The plan view: where the contact point and the object went, seen from above, in the frame of the path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robot_io.errors import ContactLost
+from robot_io.tick import Phase
+from tools.report.bounded_series import Floats
+from tools.report.run_data import RunData
+from tools.report.style import BLUE, GREEN, GREY, INK, PURPLE, VERMILLION, WIDTH_IN, new_figure, no_data
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+OUTLINE_EVERY_M = 0.5
+MOST_OUTLINES = 40
+LEFT_IN, RIGHT_IN, BOTTOM_IN, LEGEND_IN, GAP_IN = 0.75, 0.15, 0.55, 0.45, 0.32
+LOWEST_IN, HIGHEST_IN = 1.2, 7.0
+"""Of a panel; scales are always equal."""
+FORCE_ARROW_M = 0.25
+"""Length of the arrow of the median force."""
+
+
+class Place:
+    """A run in the plan's frame: x along the path from the first contact (or the path's origin), y to the left, m."""
+
+    def __init__(self, run: RunData) -> None:
+        self.run = run
+        control = run.last.after.control if run.last else None
+        self.met = bool(control and control.contact_seen)
+        self.zero_m = control.contact_from_m if control and self.met and math.isfinite(control.contact_from_m) else 0.0
+        heading = math.radians(run.rig.path.direction_deg)
+        self._cos, self._sin, self._heading = math.cos(heading), math.sin(heading), heading
+        self.x = run.ticks["along_m"] - self.zero_m
+        self.y = run.ticks["lateral_m"]
+        self.phase = run.ticks["phase"]
+
+    def slider(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return the object's time (s), place (m) and heading (rad) in the plan's frame."""
+        table, origin = self.run.slider, self.run.rig.path.origin_m
+        x, y = table["x_m"] - origin[0], table["y_m"] - origin[1]
+        along, left = x * self._cos + y * self._sin - self.zero_m, y * self._cos - x * self._sin
+        return table["t_s"], along, left, table["yaw_rad"] - self._heading
+
+    def marks(self) -> list[int]:
+        """Return ticks of the push, about every half metre of the contact point's way, first and last among them."""
+        pushed = np.flatnonzero(np.isin(self.phase, (Phase.PUSH, Phase.LOST, Phase.LOST_HOLD, Phase.REST)))
+        pushed = pushed[np.isfinite(self.x[pushed]) & np.isfinite(self.y[pushed])]
+        if not len(pushed):
+            return []
+        way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(self.x[pushed]), np.diff(self.y[pushed])))))
+        every = max(OUTLINE_EVERY_M, float(way[-1]) / MOST_OUTLINES)
+        # The last one stands for the end; one too close before it would only be drawn over.
+        wanted = [*np.arange(0.0, max(way[-1] - every / 2, every / 2), every).tolist(), float(way[-1])]
+        return [int(pushed[min(int(np.searchsorted(way, w)), len(pushed) - 1)]) for w in wanted]
+
+
+def trajectory(run: RunData) -> Figure:
+    """Draw one run from above."""
+    return _figure([Place(run)], titled=False)
+
+
+def compare(runs: Sequence[RunData]) -> Figure:
+    """Draw several runs from above, one below the other at the same scale."""
+    return _figure([Place(run) for run in runs], titled=True)
+
+
+def _figure(places: Sequence[Place], *, titled: bool) -> Figure:
+    x_range, y_range = _limits(places)
+    scale = (WIDTH_IN - LEFT_IN - RIGHT_IN) / (x_range[1] - x_range[0])
+    panel_in = scale * (y_range[1] - y_range[0])
+    step_in = panel_in + GAP_IN
+    height_in = BOTTOM_IN + step_in * len(places) + LEGEND_IN
+    figure = new_figure(height_in, constrained=False)
+    panels = []
+    for number, place in enumerate(places):
+        bottom_in = BOTTOM_IN + step_in * (len(places) - 1 - number)
+        width = 1.0 - (LEFT_IN + RIGHT_IN) / WIDTH_IN
+        axes = figure.add_axes((LEFT_IN / WIDTH_IN, bottom_in / height_in, width, panel_in / height_in))
+        panels.append(axes)
+        axes.set_xlim(*x_range)
+        axes.set_ylim(*y_range)
+        if not np.isfinite(place.x).any():
+            no_data(axes, "no pose of the base in this log")
+            continue
+        _draw(axes, place)
+        axes.set_ylabel("left of it (m)")
+        axes.tick_params(labelbottom=place is places[-1])
+        if titled:
+            axes.set_title(_title(place.run), loc="left", fontweight="bold")
+    met = all(place.met for place in places)
+    panels[-1].set_xlabel("along the path, from first contact (m)" if met else "along the path, from its origin (m)")
+    handles, labels = _legend(panels)
+    if handles:
+        figure.legend(handles, labels, loc="upper center", ncols=4, frameon=False, handlelength=1.6)
+    return figure
+
+
+def _draw(axes: Axes, place: Place) -> None:
+    x, y, marks = place.x, place.y, place.marks()
+    way = [-place.zero_m, place.run.rig.control.distance_m]
+    axes.plot(way, [0.0, 0.0], color=INK, linestyle=(0, (5, 4)), linewidth=1.0, label="path")
+    axes.plot(x, y, color=BLUE, label="contact point", zorder=3, linewidth=1.7)
+    _object(axes, place)
+    _balls(axes, place)
+    _forces(axes, place)
+    if not marks:
+        return
+    start, end = marks[0], marks[-1]
+    axes.plot(x[start], y[start], "o", color=GREEN, markersize=6, label="first contact", zorder=5)
+    if ended(place.run) == ContactLost.exit_code:
+        axes.plot(x[end], y[end], "X", color=PURPLE, markersize=9, label="object lost", zorder=6)
+    else:
+        axes.plot(x[end], y[end], "s", color=INK, markersize=5.5, label="end", zorder=6)
+
+
+def ended(run: RunData) -> int | None:
+    """Return the exit code that the log says, None when it ends before the run does."""
+    return run.last.output.exit_code if run.last and run.last.output.finished else None
+
+
+def outline(run: RunData) -> list[tuple[float, float]] | None:
+    """Return the object's outline in its own frame (m), closed; None where its shape is not known."""
+    if run.rig.base.level == "hardware":
+        return None
+    slider = run.rig.world.slider
+    if slider.shape == "circle":
+        angles = (math.tau * k / 72 for k in range(73))
+        return [(slider.radius_m * math.cos(a), slider.radius_m * math.sin(a)) for a in angles]
+    h, w = slider.length_m / 2, slider.width_m / 2
+    return [(-h, w), (-h, -w), (h, -w), (h, w), (-h, w)]
+
+
+def _title(run: RunData) -> str:
+    law = "force feedback" if run.rig.control.controller == "force" else "open loop, straight ahead"
+    if run.last is None:
+        return law
+    control = run.last.after.control
+    how = "object lost after" if ended(run) == ContactLost.exit_code else "pushed"
+    return f"{law}: {how} {control.end_progress_m or control.progress_m:.2f} m"
+
+
+def _limits(places: Sequence[Place]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the ranges along and across the path (m) that hold everything, in a panel of bearable height."""
+    xs = np.concatenate([values for place in places for values in (place.x, place.slider()[1])])
+    ys = np.concatenate([values for place in places for values in (place.y, place.slider()[2])])
+    reach = max(math.hypot(*corner) for place in places for corner in (outline(place.run) or [(0.2, 0.2)]))
+    x_low, x_high = _range(xs)
+    y_low, y_high = _range(ys)
+    x_low, x_high = x_low - reach / 2, x_high + reach
+    y_low, y_high = min(y_low, 0.0) - reach, max(y_high, 0.0) + reach
+    scale = (WIDTH_IN - LEFT_IN - RIGHT_IN) / (x_high - x_low)
+    more = max(0.0, LOWEST_IN / scale - (y_high - y_low)) / 2
+    y_low, y_high = y_low - more, y_high + more
+    more = max(0.0, scale * (y_high - y_low) / HIGHEST_IN - 1.0) * (x_high - x_low) / 2
+    return (x_low - more, x_high + more), (y_low, y_high)
+
+
+def _range(values: Floats) -> tuple[float, float]:
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
+
+
+def _object(axes: Axes, place: Place) -> None:
+    times, x, y, yaw = place.slider()
+    if not len(times):
+        return
+    first, last = 0, len(times)
+    if len(place.run.ticks["t_s"]):  # what it did before and after the run is no part of its way
+        first, last = np.searchsorted(times, (0.0, place.run.ticks["t_s"][-1])).tolist()
+    axes.plot(x[first:last], y[first:last], color=GREY, linewidth=1.2, linestyle=":", label="object's centre", zorder=2)
+    shape = outline(place.run)
+    label = "object"
+    for tick in place.marks():
+        at = min(int(np.searchsorted(times, place.run.ticks["t_s"][tick])), len(times) - 1)
+        if not (math.isfinite(x[at]) and math.isfinite(y[at]) and math.isfinite(yaw[at])):
+            continue
+        c, s = math.cos(yaw[at]), math.sin(yaw[at])
+        if shape is None:  # the shape is unknown: only where it points
+            axes.plot([x[at], x[at] + 0.15 * c], [y[at], y[at] + 0.15 * s], color=GREY, linewidth=1.2, zorder=2)
+            continue
+        axes.fill(
+            [x[at] + c * bx - s * by for bx, by in shape],
+            [y[at] + s * bx + c * by for bx, by in shape],
+            facecolor="#88888814",
+            edgecolor="#888888",
+            linewidth=0.9,
+            zorder=1.5,
+            label=label,
+        )
+        label = "_"
+
+
+def _balls(axes: Axes, place: Place) -> None:
+    """Draw the contact ball at each mark; a real rig's ball size is not known, so there it is left out."""
+    if place.run.rig.base.level == "hardware":
+        return
+    from matplotlib.patches import Circle
+
+    for tick in place.marks():
+        at = (float(place.x[tick]), float(place.y[tick]))
+        axes.add_patch(Circle(at, place.run.rig.world.ball_radius_m, facecolor="none", edgecolor=BLUE, linewidth=0.9))
+
+
+def _forces(axes: Axes, place: Place) -> None:
+    ticks, marks = place.run.ticks, place.marks()
+    fx, fy = ticks["force_x"], ticks["force_y"]
+    size = np.hypot(fx, fy)
+    marks = [tick for tick in marks if size[tick] > place.run.rig.control.force_min_N]
+    if not marks:
+        return
+    scale = FORCE_ARROW_M / float(np.median(size[marks]))
+    axes.quiver(
+        place.x[marks],
+        place.y[marks],
+        fx[marks] * scale,
+        fy[marks] * scale,
+        angles="xy",
+        scale_units="xy",
+        scale=1.0,
+        color=VERMILLION,
+        width=0.003,
+        headwidth=5,
+        zorder=4,
+    )
+    # A quiver has no entry of its own in a legend.
+    axes.plot([], [], color=VERMILLION, linewidth=2, label="force on the object")
+
+
+def _legend(panels: Sequence[Axes]) -> tuple[list[Any], list[str]]:
+    found: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    return list(found.values()), list(found)
+
+
+def write_compare(logs: Sequence[Path], out: Path) -> None:
+    """Draw the plan view of several logs into a new PNG. Raises as `read_run`; OSError when it cannot be written."""
+    from tools.report.run_data import read_run
+    from tools.report.style import png, style
+
+    runs = [read_run(log) for log in logs]
+    with style():
+        data = png(compare(runs), dpi=150)
+    with out.open("xb") as file:
+        file.write(data)

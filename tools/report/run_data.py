@@ -1,0 +1,276 @@
+"""One finished log, read once into plain numbers for figures and tables; its memory is bounded, however long it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+
+from robot_io.cdr import CdrType
+from robot_io.clock import NS_PER_S
+from robot_io.config import RigConfig, rig_from_toml
+from robot_io.errors import LogDamaged, PushError
+from robot_io.log_messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
+from robot_io.mcap_walk import walk
+from robot_io.planar_pose import wrap_angle, yaw_from_quaternion
+from robot_io.ros_messages import POSE_STAMPED
+from robot_io.tick import TICK_CDR, ControlTick, Phase
+from robot_io.world_messages import STATE_CDR
+from tools.report.bounded_series import Floats, Series, Span, Spans, Tally
+
+MOST_SKIPS = 5000
+
+TICK_COLUMNS = (
+    "t_s",
+    "along_m",
+    "lateral_m",
+    "force_x",
+    "force_y",
+    "force_raw",
+    "theta_f",
+    "theta_p",
+    "speed_wanted",
+    "speed_command",
+    "speed_measured",
+    "heading_error",
+    "phase",
+)
+"""Per tick; forces in N in the PATH frame, angles in rad in the PATH frame, speeds in m/s, heading error in rad.
+
+`along_m` is from the path's origin. `force_raw` is the size of the newest reading less the bias, as safety judges it.
+"""
+SLIDER_COLUMNS = ("t_s", "x_m", "y_m", "yaw_rad")
+READ: dict[str, CdrType[Any]] = {
+    "/control/tick": TICK_CDR,
+    "/loop/timing": LOOP_TIMING,
+    "/safety/event": SAFETY_EVENT,
+    "/world/state": STATE_CDR,
+    "/slider/pose": POSE_STAMPED,
+}
+"""The topics that are read, and what their messages are; all others are passed over."""
+
+
+@dataclass
+class RunData:
+    """What the report needs of a log. Times in s since the first tick (or first message, when there is no tick)."""
+
+    log: Path
+    rig: RigConfig
+    facts: dict[str, str]
+    recovered: str
+    """What was wrong with the log before `push log recover`; "" for a log as it was written."""
+    ticks: dict[str, Floats]
+    tick_stride: int
+    """Every how many ticks one was kept."""
+    slider: dict[str, Floats]
+    slider_source: str
+    """ "world" (truth), "motion capture", or "" when the object's pose is not known."""
+    late: Tally
+    skipped: int
+    skips: list[tuple[float, int]]
+    ages: dict[str, Tally]
+    """How old each device's newest data was at each kept tick: ft300, ur10, ridgeback."""
+    faults: list[Span]
+    modes: list[Span]
+    first: ControlTick | None
+    last: ControlTick | None
+    tick_count: int
+    messages: int
+    duration_s: float
+    config_text: str = ""
+    run_facts: dict[str, str] = field(default_factory=dict)
+    """Of `facts`, those known when the run began: with the config they tell one run from another."""
+
+
+def read_run(path: Path) -> RunData:
+    """Read a finished log. Raises UsageError (no such file) and LogDamaged (not to be trusted, or not a run's)."""
+    reader = _Reader(path)
+    topics: dict[int, str] = {}
+    schemas: dict[int, bytes] = {}
+    for item in walk(path):
+        if isinstance(item, Message):
+            reader.message(topics[item.channel_id], item.log_time, item.data)
+        elif isinstance(item, Channel):
+            topics[item.id] = item.topic
+            reader.channel(item.topic, schemas[item.schema_id])
+        elif isinstance(item, Schema):
+            schemas[item.id] = item.data
+        elif isinstance(item, Attachment) and item.name == "config.toml":
+            reader.config(item.data)
+        elif isinstance(item, Metadata):
+            reader.metadata[item.name] = dict(item.metadata)
+    return reader.finish()
+
+
+class _Reader:
+    """Takes the records of one log in the order of the file."""
+
+    def __init__(self, path: Path) -> None:
+        self.metadata: dict[str, dict[str, str]] = {}
+        self._path = path
+        self._text = ""
+        self._rig: RigConfig | None = None
+        self._ticks = Series(TICK_COLUMNS)
+        self._world = Series(SLIDER_COLUMNS)
+        self._seen = Series(SLIDER_COLUMNS)
+        self._late = Tally()
+        self._skipped = 0
+        self._skips: list[tuple[float, int]] = []
+        self._ages = {"ft300": Tally(), "ur10": Tally(), "ridgeback": Tally()}
+        self._last_reading_ns = 0
+        self._faults = Spans()
+        self._modes = Spans()
+        self._first: ControlTick | None = None
+        self._last_payload = b""
+        self._count = 0
+        self._messages = 0
+        self._reference_ns = 0
+        self._first_tick_s = 0.0
+        self._end_s = 0.0
+
+    def config(self, data: bytes) -> None:
+        """Take the rig of the run."""
+        try:
+            self._text = data.decode()
+            self._rig = rig_from_toml(self._text)
+        except (UnicodeDecodeError, PushError) as error:
+            raise self._foreign(f"its config.toml cannot be used: {error}") from None
+        heading = math.radians(self._rig.path.direction_deg)
+        self._cos, self._sin = math.cos(heading), math.sin(heading)
+
+    def channel(self, topic: str, schema: bytes) -> None:
+        """Take the declaration of a topic."""
+        if topic in READ and schema != READ[topic].schema_text.encode():
+            raise LogDamaged(
+                f"another version of this program wrote its {topic}",
+                where=str(self._path),
+                do=f"Use the version that wrote it ({self.metadata.get('run', {}).get('program', 'not named')})",
+            )
+
+    def message(self, topic: str, log_time_ns: int, payload: bytes) -> None:
+        """Take one message."""
+        if not self._messages:
+            self._reference_ns = log_time_ns
+        self._messages += 1
+        time_s = (log_time_ns - self._reference_ns) / NS_PER_S
+        self._end_s = max(self._end_s, time_s)
+        if topic == "/control/tick":
+            self._tick(time_s, payload)
+        elif topic == "/loop/timing":
+            timing = LOOP_TIMING.decode(payload)
+            self._late.add(timing.late_ns * 1e-6)
+            self._skipped += timing.skipped
+            if timing.skipped and len(self._skips) < MOST_SKIPS:
+                self._skips.append((time_s, timing.skipped))
+        elif topic == "/safety/event":
+            self._event(time_s, SAFETY_EVENT.decode(payload))
+        elif topic == "/world/state" and self._world.wants():
+            slider = STATE_CDR.decode(payload).slider
+            self._world.add((time_s, slider.x, slider.y, slider.yaw))
+        # A simulated run's /slider/pose is made of the world's state, so the world goes first.
+        elif topic == "/slider/pose" and not len(self._world) and self._seen.wants():
+            pose = POSE_STAMPED.decode(payload).pose
+            turned = pose.orientation
+            yaw = yaw_from_quaternion(turned.x, turned.y, turned.z, turned.w)
+            at = pose.position
+            self._seen.add((time_s, at.x, at.y, math.nan if yaw is None else yaw))
+
+    def finish(self) -> RunData:
+        """Return what was read."""
+        if self._rig is None:
+            raise self._foreign("it holds no config.toml")
+        last = TICK_CDR.decode(self._last_payload) if self._last_payload else None
+        recovered = self.metadata.get("recovered")
+        ticks, world, seen = self._ticks.arrays(), self._world.arrays(), self._seen.arrays()
+        for table in (ticks, world, seen):
+            table["t_s"] -= self._first_tick_s
+        source = "world" if len(self._world) else "motion capture" if len(self._seen) else ""
+        return RunData(
+            log=self._path,
+            rig=self._rig,
+            facts={key: value for record in self.metadata.values() for key, value in record.items()},
+            recovered=(recovered.get("cause", "") or "truncated") if recovered is not None else "",
+            ticks=ticks,
+            tick_stride=self._ticks.stride,
+            slider=world if source == "world" else seen,
+            slider_source=source,
+            late=self._late,
+            skipped=self._skipped,
+            skips=[(time_s - self._first_tick_s, count) for time_s, count in self._skips],
+            ages=self._ages,
+            faults=self._faults.finish(self._end_s, self._first_tick_s),
+            modes=self._modes.finish(self._end_s, self._first_tick_s),
+            first=self._first,
+            last=last,
+            tick_count=self._count,
+            messages=self._messages,
+            duration_s=self._end_s - self._first_tick_s,
+            config_text=self._text,
+            run_facts=self.metadata.get("run", {}),
+        )
+
+    def _tick(self, time_s: float, payload: bytes) -> None:
+        if self._rig is None:
+            raise self._foreign("it holds no config.toml before its first tick")
+        self._count += 1
+        self._last_payload = payload
+        if not self._ticks.wants():
+            return
+        tick = TICK_CDR.decode(payload)
+        if self._first is None:
+            self._first = tick
+            self._first_tick_s = time_s
+            self._modes.begin("", str(tick.after.safety.mode), "", time_s)
+        self._ticks.add(self._row(self._rig, tick, time_s))
+        if tick.input.ft.readings:
+            self._last_reading_ns = tick.input.ft.readings[-1].received_ns
+        now_ns = tick.input.now_ns
+        for device, at_ns in (
+            ("ft300", self._last_reading_ns),
+            ("ur10", tick.input.arm.changed_ns),
+            ("ridgeback", tick.input.base.pose_received_ns),
+        ):
+            if at_ns:
+                self._ages[device].add((now_ns - at_ns) * 1e-6)
+
+    def _row(self, rig: RigConfig, tick: ControlTick, time_s: float) -> tuple[float, ...]:
+        control, output, base = tick.after.control, tick.output, tick.input.base
+        x, y = output.contact_x - rig.path.origin_m[0], output.contact_y - rig.path.origin_m[1]
+        fx, fy, _ = control.force_world
+        raw = math.nan
+        if control.tared and tick.input.ft.readings:
+            raw = math.dist(tick.input.ft.readings[-1].force, control.bias_force)
+        driven = control.phase in (Phase.PUSH, Phase.LOST) and control.force_valid
+        turned = base.pose.yaw - control.held_yaw
+        held = control.phase >= Phase.APPROACH and math.isfinite(turned)
+        return (
+            time_s,
+            x * self._cos + y * self._sin,
+            y * self._cos - x * self._sin,
+            fx * self._cos + fy * self._sin,
+            fy * self._cos - fx * self._sin,
+            raw,
+            control.theta_f if driven and control.phase == Phase.PUSH else math.nan,
+            control.theta_p if driven else math.nan,
+            math.hypot(output.wanted_body.vx, output.wanted_body.vy),
+            math.hypot(output.command_body.vx, output.command_body.vy),
+            math.hypot(base.odometry.vx, base.odometry.vy),
+            wrap_angle(turned) if held else math.nan,
+            float(control.phase),
+        )
+
+    def _event(self, time_s: float, event: SafetyEvent) -> None:
+        if event.kind == "mode":
+            self._modes.begin("", str(event.mode_after), "", time_s)
+        elif event.kind == "fault":
+            self._faults.begin(event.fault, event.fault, event.text, time_s)
+        else:
+            self._faults.end(event.fault, time_s)
+
+    def _foreign(self, what: str) -> LogDamaged:
+        return LogDamaged(
+            f"this is no log of a push: {what}", where=str(self._path), do="Give the run.mcap of a `push run`"
+        )

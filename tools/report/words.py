@@ -1,0 +1,164 @@
+"""What a run came to, in words and numbers, from its log alone: verdict, figures, settings that differ."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from control.run_notes import outcome
+from robot_io.config import RigConfig, load_rig, shipped_rigs
+from robot_io.tick import Phase
+from safety.faults import FAULTS
+from tools.report.bounded_series import Floats
+from tools.report.run_data import RunData
+from tools.report.style import phase_spans
+from tools.run.verdict import VERDICTS
+
+
+class Verdict(NamedTuple):
+    """How the run ended: one line, why, and whether it is good news."""
+
+    line: str
+    why: str
+    good: bool
+
+
+def verdict(run: RunData) -> Verdict:
+    """Return the verdict of a run, as far as its log tells."""
+    if run.last is None:
+        return Verdict(
+            "Never began", "The loop made no tick: the devices were not ready, or it was stopped before.", False
+        )
+    last = run.last
+    end = outcome(last.input, last.after, last.output)
+    distance, lateral = f"{end['distance_m']:.2f} m", f"{end['lateral_error_m']:+.3f} m"
+    faults = [FAULTS[fault].text if fault in FAULTS else fault for fault in last.output.faults]
+    # Warnings at the end explain nothing, unless there is nothing else.
+    strong = [FAULTS[fault].text for fault in last.output.faults if fault in FAULTS and FAULTS[fault].mode]
+    why = "; ".join(strong or faults)
+    if not last.output.finished:
+        phase = str(end["phase"]).lower().replace("_", " ")
+        return Verdict(
+            f"Broken off after {distance}",
+            f"The log ends while the run goes on (phase {phase}){': ' + why if why else ''}.",
+            False,
+        )
+    if last.output.exit_code == 0:
+        return Verdict(f"Pushed {distance}", f"Lateral error at the end: {lateral}.", True)
+    name = VERDICTS.get(last.output.exit_code, "error")
+    if not why:
+        why = "the force did not come back" if name == "contact lost" else "see the safety events"
+    return Verdict(
+        f"{name.capitalize()} after {distance}", f"{why.capitalize()}. Lateral offset at the end: {lateral}.", False
+    )
+
+
+def tiles(run: RunData) -> list[tuple[str, str]]:
+    """Return the figures of the run: (what, value with unit)."""
+    if run.last is None:
+        return [("log", f"{run.messages} messages"), ("length", f"{run.duration_s:.1f} s")]
+    last = run.last
+    end = outcome(last.input, last.after, last.output)
+    control = last.after.control
+    ticks = run.ticks
+    size = np.hypot(ticks["force_x"], ticks["force_y"])
+    pushing = (ticks["phase"] == Phase.PUSH) & np.isfinite(size)
+    pushed_s = sum(until - since for phase, since, until in phase_spans(ticks) if phase == Phase.PUSH)
+    raw = ticks["force_raw"]
+    found = [
+        ("distance", f"{end['distance_m']:.3f} of {run.rig.control.distance_m:g} m"),
+        ("lateral error at the end", f"{end['lateral_error_m']:+.3f} m"),
+        ("furthest off the path", _number(_furthest(ticks["lateral_m"][pushing]), "m", "+.3f")),
+        ("time pushing", f"{pushed_s:.1f} s"),
+        ("force while pushing, median", _number(float(np.median(size[pushing])) if pushing.any() else math.nan, "N")),
+        ("greatest force", _number(float(np.nanmax(raw)) if np.isfinite(raw).any() else math.nan, "N")),
+        ("sensor after the push", _number(control.residual_N, "N from zero", ".2f")),
+        ("ticks skipped", f"{run.skipped} of {run.tick_count + run.skipped}"),
+    ]
+    return [(what, value) for what, value in found if value]
+
+
+def baseline_of(rig: RigConfig) -> str:
+    """Return the shipped rig to compare settings with: the one of its name, else the one of its level."""
+    if rig.name in shipped_rigs():
+        return rig.name
+    levels = {rig.ft.level, rig.arm.level, rig.base.level}
+    return "thing" if "hardware" in levels else "sim" if "sim" in levels else "emulated"
+
+
+def differences(rig: RigConfig, baseline: str) -> list[tuple[str, str, str]]:
+    """Return (setting, shipped value, this run's value) of every setting that differs."""
+    ours, theirs = _flat(msgspec.to_builtins(rig)), _flat(msgspec.to_builtins(load_rig(baseline)))
+    names = dict.fromkeys((*theirs, *ours))
+    return [
+        (name, str(theirs.get(name, "-")), str(ours.get(name, "-")))
+        for name in names
+        if ours.get(name) != theirs.get(name) and name != "description"
+    ]
+
+
+def timing_rows(run: RunData) -> list[tuple[str, str]]:
+    """Return the loop's timing: (what, value)."""
+    if not run.late.total or run.first is None or run.last is None:
+        return []
+    late = run.late
+    span_s = (run.last.input.now_ns - run.first.input.now_ns) * 1e-9
+    steps = run.last.input.tick - run.first.input.tick
+    rows = [
+        ("rate, wanted", f"{run.rig.loop.rate_hz:g} Hz"),
+        ("rate, measured", f"{steps / span_s:.3f} Hz" if span_s > 0 else "-"),
+        ("ticks", str(run.tick_count)),
+        ("ticks skipped", str(run.skipped)),
+        ("late, half of the ticks below", f"{late.percentile_ms(50):.2f} ms"),
+        ("late, 99 % below", f"{late.percentile_ms(99):.2f} ms"),
+        ("late, 99.9 % below", f"{late.percentile_ms(99.9):.2f} ms"),
+        ("late, worst", f"{late.worst_ms:.2f} ms"),
+    ]
+    dropped = run.last.input.host.log_dropped
+    return [*rows, ("records that did not fit into the log", str(dropped))]
+
+
+def counters(run: RunData, summary: dict[str, Any]) -> dict[str, list[tuple[str, str]]]:
+    """Return (counter, value) per device: the drivers' own counts if the summary has them, else the last tick's."""
+    found: dict[str, dict[str, Any]] = {"ft300": {}, "ur10": {}, "ridgeback": {}}
+    if run.last is not None:
+        ft, arm, base = run.last.input.ft, run.last.input.arm, run.last.input.base
+        found["ft300"] = {"packets_ok": ft.packets_ok, "crc_fail": ft.crc_fail, "junk_bytes": ft.junk_bytes}
+        found["ur10"] = {"packets": arm.packets}
+        found["ridgeback"] = {"pose": base.pose_seq, "odometry": base.odometry_seq}
+    told = summary.get("devices")
+    for device in found:
+        if isinstance(told, dict) and isinstance(told.get(device), dict):
+            found[device].update(told[device])
+    rows = {}
+    for device, values in found.items():
+        age = run.ages[device]
+        rows[device] = [(str(name).replace("_", " "), str(value)) for name, value in list(values.items())[:100]]
+        if age.total:
+            rows[device] += [
+                ("age of newest data, median", f"{age.percentile_ms(50):.1f} ms"),
+                ("age of newest data, 99 % below", f"{age.percentile_ms(99):.1f} ms"),
+                ("age of newest data, worst", f"{age.worst_ms:.1f} ms"),
+            ]
+    return rows
+
+
+def _number(value: float, unit: str, form: str = ".1f") -> str:
+    return f"{value:{form}} {unit}" if math.isfinite(value) else ""
+
+
+def _furthest(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite[np.argmax(np.abs(finite))]) if len(finite) else math.nan
+
+
+def _flat(tree: Any, name: str = "") -> dict[str, Any]:
+    if not isinstance(tree, dict):
+        return {name: tree}
+    found: dict[str, Any] = {}
+    for key, value in tree.items():
+        found |= _flat(value, f"{name}.{key}" if name else str(key))
+    return found

@@ -1,0 +1,1 @@
+"""What one push is made of: its processes, its folder, its state and its end."""

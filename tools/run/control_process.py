@@ -1,0 +1,115 @@
+"""The control process: `python -m tools.run.control_process` (job on stdin). Opens the sensor and runs the loop."""
+
+from __future__ import annotations
+
+import gc
+import os
+import select
+import signal
+import socket
+import sys
+
+import msgspec
+
+from control.loop import ControlLoop, Watch
+from control.run_notes import outcome
+from robot_io.base_link import BaseLink
+from robot_io.config import rig_from_toml
+from robot_io.errors import PushError
+from robot_io.ft300 import Ft300
+from robot_io.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ring import Ring
+from robot_io.status_pipe import StatusPipe
+from robot_io.ur10 import ArmLink
+from tools.run.jobs import ControlJob
+from tools.run.run_state import first_state, status_line
+from tools.run.tick_core import TickCore
+
+PRIORITY = 80
+VERDICT_WITHIN_S = 60.0
+"""The base stands already; this long a launcher that is held up (a stopped terminal) may take to listen again."""
+
+
+def main() -> int:
+    """Run the loop to its end; the exit code is the run's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=ControlJob)
+    die_with_parent(job.launcher_pid)
+    set_timer_slack_1ns()
+    status = StatusPipe(job.status_fd)
+    rig = rig_from_toml(job.rig_toml)
+    sensor = Ft300(job.ft_port)
+    try:
+        info = sensor.open()
+        sensor.start()
+    except PushError as error:
+        sensor.close()
+        status.error(error)
+        return error.exit_code
+    core = TickCore.of(rig, in_contact=job.saved_tare is not None)
+    base = BaseLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
+    arm = ArmLink(job.arm_record_fd)
+    watch = Watch(gate=job.gate_pidfd, arm=job.arm_pidfd, recorder=job.recorder_pidfd)
+    loop = ControlLoop(
+        core.fold,
+        first_state(job.saved_tare),
+        rate_hz=rig.loop.rate_hz,
+        sensor=sensor,
+        arm=arm,
+        base=base,
+        ring=Ring(job.ring_fd),
+        watch=watch,
+        operator_fd=job.operator_fd,
+        on_status=lambda inp, state, output: status.say("status", **status_line(inp, state, output)),
+    )
+    signal.signal(signal.SIGTERM, lambda *_: loop.stop_requested())
+    status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
+    if not _wait_for_go(job.operator_fd, sensor):
+        base.close()
+        sensor.stop()
+        sensor.close()
+        return 1
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    lock_memory()
+    loop.run()
+    base.close()  # first of all: the gate takes the EOF for the end and sends its last zeros
+    gc.enable()
+    return _finish(loop, sensor, status, rig.loop.rate_hz)
+
+
+def _wait_for_go(operator_fd: int, sensor: Ft300) -> bool:
+    """Wait until the launcher says that every device is ready; keep the sensor drained meanwhile."""
+    os.set_blocking(operator_fd, False)
+    while True:
+        readable, _, _ = select.select([operator_fd], [], [], 0.05)
+        sensor.drain()
+        if readable:
+            return os.read(operator_fd, 1) == b"G"
+
+
+def _finish(loop: ControlLoop, sensor: Ft300, status: StatusPipe, rate_hz: float) -> int:
+    counters = sensor.health().counters
+    sensor.stop()
+    sensor.close()
+    if loop.last is None:
+        return 1
+    figures = outcome(*loop.last)
+    status.say_whole(
+        VERDICT_WITHIN_S,
+        "finished",
+        **figures,
+        loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns),
+        events=loop.notes.events,
+        fault_counts=loop.notes.fault_counts,
+        ft=counters,
+        error="" if loop.error is None else f"{type(loop.error).__name__}: {loop.error}",
+    )
+    if loop.error is not None:
+        sys.excepthook(type(loop.error), loop.error, loop.error.__traceback__)
+    return loop.last[2].exit_code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

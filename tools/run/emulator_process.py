@@ -1,0 +1,103 @@
+"""The emulators of a run, in one process: `python -m tools.run.emulator_process` (job on stdin).
+
+World and wire servers share one thread and one epoll. When the run ends, or its launcher dies, they serve on for
+a moment, so that the wheels are seen to come to rest and the log holds it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import math
+import os
+import signal
+import sys
+
+import msgspec
+
+from robot_io.clock import NS_PER_MS, monotonic_ns
+from robot_io.config import rig_from_toml
+from robot_io.errors import PushError
+from robot_io.event_loop import EventLoop
+from robot_io.process import lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ring import Ring
+from robot_io.status_pipe import StatusPipe
+from sim_backend.world import World
+from tools.log.world_log import into
+from tools.run.emulators import OPENERS, endpoint
+from tools.run.jobs import EmulatorJob
+
+PRIORITY = 70
+LINGER_NS = 1_000 * NS_PER_MS
+REST_NS = 100 * NS_PER_MS
+WATCH_NS = 20 * NS_PER_MS
+_PR_SET_PDEATHSIG = 1
+
+
+class Ending:
+    """Ends the loop a moment after SIGTERM: when the base has come to rest, at most after LINGER_NS."""
+
+    def __init__(self, loop: EventLoop, world: World) -> None:
+        self._loop = loop
+        self._world = world
+        self._asked = False
+        self._since_ns = 0
+        self._rest_ns = 0
+        signal.signal(signal.SIGTERM, self._ask)
+        loop.call_every(WATCH_NS, self._look)
+
+    def _ask(self, *_: object) -> None:
+        self._asked = True
+
+    def _look(self, _deadline_ns: int) -> None:
+        now_ns = monotonic_ns()
+        self._world.advance_to(now_ns)
+        if not self._asked:
+            return
+        self._since_ns = self._since_ns or now_ns
+        twist = self._world.read_base(now_ns).twist
+        rest = math.hypot(twist.vx, twist.vy) == 0.0
+        self._rest_ns = (self._rest_ns or now_ns) if rest else 0
+        if (rest and now_ns - self._rest_ns >= REST_NS) or now_ns - self._since_ns >= LINGER_NS:
+            self._loop.stop()
+
+
+def main() -> int:
+    """Serve until SIGTERM."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=EmulatorJob)
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGTERM), 0, 0, 0)
+    if os.getppid() != job.launcher_pid:
+        return 1
+    set_timer_slack_1ns()
+    status = StatusPipe(job.status_fd)
+    rig = rig_from_toml(job.rig_toml)
+    loop = EventLoop()
+    ring = Ring(job.ring_fd)
+    opened = []
+    try:
+        world = World(rig, job.seed, monotonic_ns(), into(ring.push))
+        opened = [OPENERS[device](loop, world, rig) for device in job.devices]
+    except PushError as error:
+        for emulator in opened:
+            emulator.close()
+        status.error(error)
+        return error.exit_code
+    Ending(loop, world)
+    status.say("ready", endpoints=[endpoint(emulator) for emulator in opened], realtime=try_realtime(PRIORITY))
+    gc.collect()
+    gc.freeze()
+    lock_memory()
+    loop.run()
+    for emulator in opened:
+        emulator.close()
+    status.say(
+        "finished",
+        world_stalls=world.stalls,
+        counters={endpoint_["device"]: emulator.counters for emulator in opened for endpoint_ in [endpoint(emulator)]},
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

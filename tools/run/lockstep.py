@@ -1,0 +1,212 @@
+"""Level `sim`: three simulated devices, one process, one thread, a virtual clock; same core, same gate, same log.
+
+Two runs with the same rig and seed give identical files: log times start at a fixed epoch.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from msgspec.structs import replace
+
+from control.loop import ft_input
+from control.run_notes import RunNotes, outcome
+from robot_io.arm_record import ArmRecord
+from robot_io.base_feed import BaseOdometry, BasePose, BaseReport
+from robot_io.base_record import BaseRecord
+from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, VirtualClock
+from robot_io.config import RigConfig
+from robot_io.gate_frame import GateFrame
+from robot_io.gate_log import GateLog
+from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
+from safety import gate
+from safety.gate import GateLimits, GateState
+from safety.settings import SafetySettings
+from sim_backend.rig_settings import ridgeback_settings
+from sim_backend.sim_ft300 import SimFt300
+from sim_backend.sim_ridgeback import SimRidgeback
+from sim_backend.sim_ur10 import SimUr10
+from sim_backend.world import World
+from tools.log.run_log import RunLog
+from tools.log.world_log import into
+from tools.run.run_facts import run_facts
+from tools.run.run_state import first_state
+from tools.run.saved_tare import SavedTare
+from tools.run.tick_core import TickCore, tick_message
+
+START_NS = NS_PER_S
+"""Virtual time of the first tick."""
+MOST_SECONDS = 4 * 3600.0
+
+
+class LockstepLog(Protocol):
+    """What takes the records of a lockstep run: a `RunLog`, or nothing at all in a sweep."""
+
+    def record(self, kind: int, time_ns: int, payload: bytes) -> None:
+        """Take one ring record."""
+        ...
+
+    def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
+        """Take one tick, encoded and as it is."""
+        ...
+
+
+class Lockstep:
+    """One push in lockstep. `log` gets each record as the rings would; `run` returns the figures of the end."""
+
+    def __init__(
+        self,
+        rig: RigConfig,
+        seed: int,
+        log: LockstepLog,
+        *,
+        saved: SavedTare | None = None,
+    ) -> None:
+        self.rig = rig
+        self._log = log
+        push = log.record
+        self._clock = VirtualClock(START_NS)
+        self._period_ns = round(NS_PER_S / rig.loop.rate_hz)
+        self.world = World(rig, seed, START_NS, into(push))
+        sensor, world = rig.world.sensor, rig.world
+        self._ft = SimFt300(
+            self.world, self._clock, rate_hz=sensor.rate_hz, phase=sensor.phase, latency_ms=sensor.latency_ms
+        )
+        self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_rate_hz, phase=world.arm_phase)
+        self._base = SimRidgeback(
+            self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
+        )
+        self._core = TickCore.of(rig, in_contact=saved is not None)
+        self._state = first_state(saved)
+        settings = SafetySettings.of(rig)
+        limits = settings.envelope
+        self._gate_limits = GateLimits(
+            limits.speed, limits.turn_rate, limits.acceleration, limits.turn_acceleration, settings.period_ns
+        )
+        self._gate = GateState()
+        self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
+        self._record = BaseRecord()
+        self.notes = RunNotes()
+        self.operator = Operator.NONE
+
+    def run(self, on_tick: Callable[[TickInput, TickState, TickOutput], None]) -> dict[str, Any]:
+        """Run to the end; `on_tick` is called after each tick (to pace and to show)."""
+        devices = (self._ft, self._arm, self._base)
+        for device in devices:
+            device.open()
+            device.start()
+        tick = 0
+        while True:
+            now_ns = START_NS + tick * self._period_ns
+            self._clock.advance_to(now_ns)
+            inp, output = self._tick(tick, now_ns)
+            on_tick(inp, self._state, output)
+            if output.finished or now_ns > MOST_SECONDS * NS_PER_S:
+                break
+            tick += 1
+        counters = {"ft300": self._ft.health().counters, "ur10": {"packets": inp.arm.packets}}
+        counters["ridgeback"] = self._base.health().counters
+        for device in devices:
+            device.stop()
+            device.close()
+        return {
+            **outcome(inp, self._state, output),
+            "loop": {"rate_hz": self.rig.loop.rate_hz, "ticks": tick + 1, "skipped": 0},
+            "events": self.notes.events,
+            "fault_counts": self.notes.fault_counts,
+            "devices": counters,
+        }
+
+    def _tick(self, tick: int, now_ns: int) -> tuple[TickInput, TickOutput]:
+        readings = self._ft.drain()
+        self._take_base(now_ns)
+        operator, self.operator = self.operator, Operator.NONE
+        inp = TickInput(
+            tick,
+            now_ns,
+            int(operator),
+            HostInput(0, 0, True, True, True, False, 0),
+            ft_input(readings, self._ft.health()),
+            self._arm.read() or ArmRecord(),
+            self._record,
+        )
+        before = self._state
+        after, output = self._core.fold(before, inp)
+        self._send(tick, now_ns, output)
+        message = tick_message(inp, before, after, output)
+        self._log.tick(now_ns, TICK_CDR.encode(message), message)
+        self._state = after
+        self.notes.note(inp, output)
+        return inp, output
+
+    def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
+        """Pass the command through the gate's judgement, as the gate process does."""
+        frame = GateFrame(self._gate.seq + 1, tick, now_ns, output.mode, output.command_body)
+        self._gate = gate.on_clock(gate.on_frame(self._gate_limits, self._gate, frame, now_ns), now_ns)
+        wanted = gate.due(self._gate, now_ns)
+        if wanted is not None:
+            really = self._base.command(wanted)
+            self._gate = gate.sent(self._gate, wanted, now_ns)
+            self._record = replace(self._record, sent=really, sent_ns=now_ns)
+            self._gate_log.sent(now_ns, really)
+
+    def _take_base(self, now_ns: int) -> None:
+        changes: dict[str, Any] = {}
+        pose_seq, odometry_seq = self._record.pose_seq, self._record.odometry_seq
+        for sample in self._base.drain():
+            value, at_ns = sample.value, sample.received_ns
+            changes["newest_inbound_ns"] = at_ns
+            self._gate_log.inbound(sample)
+            if isinstance(value, BasePose):
+                pose_seq += 1
+                changes.update(pose=value.pose, pose_valid=value.valid, pose_received_ns=at_ns)
+            elif isinstance(value, BaseOdometry):
+                odometry_seq += 1
+                changes.update(odometry=value.twist, odometry_received_ns=at_ns)
+                self._gate = gate.on_speed(self._gate_limits, self._gate, value.twist)
+            elif isinstance(value, BaseReport):
+                changes.update(status=value.status, status_received_ns=at_ns)
+        self._record = replace(
+            self._record,
+            **changes,
+            pose_seq=pose_seq,
+            odometry_seq=odometry_seq,
+            accepted_seq=self._gate.seq,
+            latched=self._gate.latch != gate.Latch.NONE,
+            latch_cause=int(self._gate.latch),
+            verdict=int(self._gate.latch),
+            published_ns=now_ns,
+        )
+
+
+def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
+    """Open the log of a lockstep run; its facts name nothing that differs from run to run."""
+    facts = run_facts("sim", seed, in_contact=in_contact)
+    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
+
+
+class WallPace:
+    """Paces lockstep ticks to the wall clock."""
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._next_s = time.monotonic()
+
+    def wait(self) -> None:
+        """Wait for the next tick's time; a late tick is not caught up in a burst."""
+        self._next_s = max(self._next_s + self._period_s, time.monotonic())
+        time.sleep(max(0.0, self._next_s - time.monotonic()))
+
+
+def stop_on_signals(run: Lockstep) -> None:
+    """Make SIGINT, SIGTERM and SIGHUP the operator's stop."""
+
+    def ask(*_: object) -> None:
+        run.operator = Operator.STOP
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, ask)

@@ -1,0 +1,212 @@
+"""The processes of a wall-clock run and the descriptors between them.
+
+    what               from -> to                                    kind
+    log rings          control, gate, emulators -> recorder          memfd, one each
+    alive pipes        control, gate, emulators -> recorder          nothing is written: EOF says that it is gone
+    gate link          control <-> gate                              SEQPACKET; EOF says that control is gone
+    records            gate -> control, arm -> control               memfd, newest wins
+    pidfds             gate, arm, recorder -> control                readable when the process is gone
+    operator pipe      launcher -> control                           one byte each: go, stop, resume
+    status pipes       each of them -> launcher                      JSON lines
+
+Every copy of an inherited end that stayed open in the launcher would hide the end of the process that holds it, so
+all are closed here as soon as the last process has its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import socket
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+from msgspec.structs import replace
+
+from robot_io.arm_record import ARM_RECORD_BYTES
+from robot_io.base_record import BASE_RECORD_BYTES
+from robot_io.clock import wall_offset_ns
+from robot_io.config import RigConfig, rig_to_toml
+from robot_io.ring import Ring
+from robot_io.shared_record import SharedRecord
+from robot_io.ur10 import spawn_child
+from safety.gate import GateLimits
+from safety.gate_process import GateJob
+from safety.settings import SafetySettings
+from tools.recorder import Job as RecorderJob
+from tools.recorder import RingSource
+from tools.rig import devices_at
+from tools.run.children import Child, spawn
+from tools.run.jobs import ControlJob, EmulatorJob
+from tools.run.run_facts import level_of, run_facts
+from tools.run.saved_tare import SavedTare
+
+RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
+"""Room for about two minutes of a recorder that does not drain."""
+DEVICE_NAMES = {"ft": "ft300", "arm": "ur10", "base": "ridgeback"}
+
+
+class Processes:
+    """Starts the processes of one run, by `start_emulators` and `start_the_rest`; `children` has them by name.
+
+    saved: the tare of a run that starts in contact. log: where the recorder writes. on_spawn: called with each
+    child as soon as it is there.
+    """
+
+    def __init__(
+        self,
+        rig: RigConfig,
+        *,
+        seed: int,
+        saved: SavedTare | None,
+        log: Path,
+        on_spawn: Callable[[Child], None],
+    ) -> None:
+        self._rig = rig
+        self._seed = seed
+        self._saved = saved
+        self._log = log
+        self._on_spawn = on_spawn
+        self._offset_ns = wall_offset_ns()
+        self._rings = {name: Ring.create(f"{name}-log", size) for name, size in RING_BYTES.items()}
+        self._alive = {name: os.pipe() for name in RING_BYTES}
+        self._operator_fd = -1
+        self.children: dict[str, Child] = {}
+
+    @property
+    def pids(self) -> dict[str, int]:
+        """Process ids by name."""
+        return {name: child.pid for name, child in self.children.items()}
+
+    def start_emulators(self) -> list[str]:
+        """Start the world and the wire servers of all devices at level emulated; return the name of the process."""
+        emulated = tuple(DEVICE_NAMES[device] for device in devices_at(self._rig, "emulated"))
+        if not emulated:
+            return []
+        ring_fd, alive_fd = self._rings["world"].fd, self._alive["world"][1]
+        job = EmulatorJob(rig_to_toml(self._rig), self._seed, emulated, os.getpid(), ring_fd, alive_fd, -1)
+        self._spawn("emulators", "tools.run.emulator_process", job, [ring_fd, alive_fd])
+        return ["emulators"]
+
+    def start_the_rest(self, config_text: str) -> list[str]:
+        """Start recorder, gate, arm and control, once the emulators are ready; return their names.
+
+        config_text: the resolved rig, for the log.
+        """
+        rig = self._with_endpoints()
+        arm = SharedRecord.create("arm", ARM_RECORD_BYTES)
+        base = SharedRecord.create("base", BASE_RECORD_BYTES)
+        control_end, gate_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        operator_read, self._operator_fd = os.pipe()
+        os.set_blocking(self._operator_fd, False)
+        self._start_recorder(config_text)
+        self._start_gate(rig, gate_end.fileno(), base.fd)
+        self._start_arm(rig, arm.fd)
+        self._start_control(rig, control_end.fileno(), base.fd, arm.fd, operator_read)
+        control_end.close()
+        gate_end.close()
+        os.close(operator_read)
+        for read_end, write_end in self._alive.values():
+            os.close(read_end)
+            os.close(write_end)
+        for ring in self._rings.values():
+            ring.close()
+        for record in (arm, base):
+            record.close()
+        return ["recorder", "gate", "arm", "control"]
+
+    def tell_control(self, key: bytes) -> None:
+        """Pass G (go), S (stop) or R (resume) on; nothing happens when control is not there to hear it."""
+        if self._operator_fd >= 0:
+            with contextlib.suppress(OSError):
+                os.write(self._operator_fd, key)
+
+    def hang_up(self) -> None:
+        """Close the operator pipe, which control takes for a stop; idempotent."""
+        if self._operator_fd >= 0:
+            os.close(self._operator_fd)
+            self._operator_fd = -1
+
+    def _spawn(self, name: str, module: str, job: msgspec.Struct, fds: list[int]) -> None:
+        self._adopt(spawn(name, module, job, fds))
+
+    def _adopt(self, child: Child) -> None:
+        self.children[child.name] = child
+        self._on_spawn(child)
+
+    def _with_endpoints(self) -> RigConfig:
+        """Return the rig with the addresses of its emulators in it."""
+        rig = self._rig
+        emulators = self.children.get("emulators")
+        ready = (emulators.ready if emulators else None) or {}
+        for found in ready.get("endpoints", []):
+            if found["device"] == "ft300":
+                rig = replace(rig, ft=replace(rig.ft, port=found["port"]))
+            elif found["device"] == "ur10":
+                rig = replace(rig, arm=replace(rig.arm, host=found["host"]))
+            else:
+                rig = replace(rig, base=replace(rig.base, url=found["url"]))
+        return rig
+
+    def _start_recorder(self, config_text: str) -> None:
+        facts = run_facts(level_of(self._rig), self._seed, in_contact=self._saved is not None)
+        facts["kernel"] = platform.release()
+        rings = [RingSource(name, ring.fd) for name, ring in self._rings.items()]
+        alive = [self._alive[name][0] for name in ("control", "gate", "world")]
+        job = RecorderJob(str(self._log), config_text, facts, self._offset_ns, rings, alive, -1)
+        self._spawn("recorder", "tools.recorder", job, [*(ring.fd for ring in rings), *alive])
+
+    def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
+        settings = SafetySettings.of(rig)
+        envelope = settings.envelope
+        limits = GateLimits(
+            envelope.speed,
+            envelope.turn_rate,
+            envelope.acceleration,
+            envelope.turn_acceleration,
+            settings.period_ns,
+        )
+        ring_fd = self._rings["gate"].fd
+        job = GateJob(rig.base, rig.frames, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns)
+        self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
+
+    def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
+        status = os.pipe()
+        stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it
+        process = spawn_child(
+            rig.arm.host,
+            hold=rig.arm.hold,
+            record_fd=record_fd,
+            status_fd=status[1],
+            held_pose_rad=rig.arm.held_pose_rad,
+            held_pose_tolerance_rad=rig.arm.held_pose_tolerance_rad,
+            stderr=stderr,
+        )
+        os.close(status[1])
+        self._adopt(Child("arm", process, status[0], stderr))
+
+    def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:
+        ring_fd, alive_fd = self._rings["control"].fd, self._alive["control"][1]
+        # Opened here, where a process that has ended already can still be opened: nobody has waited for it yet.
+        pidfds = [os.pidfd_open(self.children[name].pid) for name in ("gate", "arm", "recorder")]
+        job = ControlJob(
+            rig_to_toml(rig),
+            rig.ft.port,
+            self._saved,
+            os.getpid(),
+            gate_fd,
+            base_fd,
+            arm_fd,
+            ring_fd,
+            alive_fd,
+            operator_fd,
+            -1,
+            *pidfds,
+        )
+        fds = [gate_fd, base_fd, arm_fd, ring_fd, alive_fd, operator_fd, *pidfds]
+        self._spawn("control", "tools.run.control_process", job, fds)
+        for pidfd in pidfds:
+            os.close(pidfd)

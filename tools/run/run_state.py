@@ -1,0 +1,31 @@
+"""Where a run starts, and the figures of its live line."""
+
+from __future__ import annotations
+
+from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState
+from tools.run.saved_tare import SavedTare
+
+
+def first_state(saved: SavedTare | None) -> TickState:
+    """Return the state a run begins with: untared, or with a tare saved earlier, valid at the joints it holds."""
+    if saved is None:
+        return TickState()
+    bias = saved.bias
+    return TickState(ControlState(tared=True, bias_force=bias[:3], bias_torque=bias[3:], held_joints=saved.joints))
+
+
+def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
+    """Return the figures of the live line."""
+    control = state.control
+    return {
+        "tick": inp.tick,
+        "phase": Phase(control.phase).name,
+        "mode": Mode(output.mode).name,
+        "progress_m": round(control.progress_m, 4),
+        "lateral_m": round(control.lateral_m, 4),
+        "force_N": [round(value, 2) for value in control.force_world],
+        "theta_p": round(control.theta_p, 4),
+        "speed": round(control.speed, 4),
+        "faults": list(output.faults),
+        "late_ms": round(inp.host.late_ns * 1e-6, 3),
+    }

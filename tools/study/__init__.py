@@ -1,0 +1,1 @@
+"""Many simulated pushes: which lanes, how they are spread over workers, what is kept and drawn."""

@@ -1,0 +1,142 @@
+"""The figures of a study, as PNG and SVG: all trajectories, and the paper's four samples with the slider drawn in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sim_backend.lanes import State, Timing
+from tools.study.grid import Case
+from tools.study.items import Row
+
+if TYPE_CHECKING:
+    import numpy as np
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+SAMPLE_SECONDS = 120.0
+"""Of a sample's ten minutes, what is drawn."""
+OUTLINE_EVERY_S = 15.0
+MOST_LINES = 1000
+"""Of more trajectories in a panel, some evenly spaced ones are drawn."""
+
+
+def save(figure: Figure, out: Path, name: str) -> list[str]:
+    """Write a figure as NAME.png and NAME.svg; the same figure gives the same bytes. Returns the file names."""
+    import matplotlib as mpl
+
+    with mpl.rc_context({"svg.hashsalt": name}):
+        figure.savefig(out / f"{name}.png", dpi=150)
+        figure.savefig(out / f"{name}.svg", metadata={"Date": None})
+    return [f"{name}.png", f"{name}.svg"]
+
+
+def trajectories(cases: Sequence[Case], states: Floats, title: str) -> Figure:
+    """Draw the path of every slider's centre, one panel a shape. `states`: (cases, records, 6)."""
+    shapes = list(dict.fromkeys(case.shape for case in cases))
+    figure = _figure(7.0, 1.2 + 1.9 * len(shapes))
+    panels = figure.subplots(len(shapes), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, shape in zip(panels, shapes, strict=True):
+        chosen = [i for i, case in enumerate(cases) if case.shape == shape]
+        drawn = chosen[:: -(-len(chosen) // MOST_LINES)]
+        for i in drawn:
+            axes.plot(states[i, :, 0], states[i, :, 1], linewidth=0.5, alpha=0.4)
+        axes.axhline(0.0, color="black", linewidth=0.8, linestyle="--")
+        some = "" if len(drawn) == len(chosen) else f", {len(drawn)} of them drawn"
+        axes.set_title(f"{shape}: {len(chosen)} pushes{some}", fontsize=9)
+        axes.set_ylabel("y (m)")
+    panels[-1].set_xlabel("x (m)")
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def experiment(rows: Sequence[Row], states: Floats) -> Figure:
+    """Draw the simulated experiment, one panel a slider: the law's pushes in colour, open loop in black.
+
+    `states`: (runs, kept, 3), the slider's pose.
+    """
+    sliders = list(dict.fromkeys(str(row["slider"]) for row in rows))
+    figure = _figure(7.0, 0.6 + 2.2 * len(sliders))
+    panels = figure.subplots(len(sliders), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, slider in zip(panels, sliders, strict=True):
+        for i, row in enumerate(rows):
+            if row["slider"] == slider:
+                style = {"color": "black", "linewidth": 1.2} if row["controller"] == "open-loop" else {"linewidth": 1.0}
+                axes.plot(states[i, :, 0], states[i, :, 1], **style)
+        for y in (-0.5, 0.5):
+            axes.axhline(y, color="grey", linewidth=0.8, linestyle=":")
+        axes.axhline(0.0, color="grey", linewidth=0.8, linestyle="--")
+        axes.set_title(f"{slider}: by the law in colour, open loop in black", fontsize=9)
+        axes.set_ylabel("y (m)")
+    panels[-1].set_xlabel("x (m)")
+    return figure
+
+
+def samples(cases: Sequence[Case], timing: Timing) -> Figure:
+    """Draw cases with the slider's outline, contact point and pushing direction along the first two minutes."""
+    from sim_backend.lanes import simulate_lane
+    from tools.study.grid import lane_of
+
+    every = max(1, round(1.0 / timing.dt_s))
+    steps = min(timing.steps, round(SAMPLE_SECONDS / timing.dt_s))
+    fine = Timing(timing.dt_s, steps, every)
+    figure = _figure(7.0, 1.7 * len(cases))
+    panels = figure.subplots(len(cases), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, case in zip(panels, cases, strict=True):
+        _, states = simulate_lane(lane_of(case), fine)
+        axes.plot([s[0] for s in states], [s[1] for s in states], linewidth=1.0, color="tab:blue")
+        for state in states[:: max(1, round(OUTLINE_EVERY_S / (every * timing.dt_s)))]:
+            _draw_slider(axes, case, state)
+        axes.axhline(0.0, color="black", linewidth=0.6, linestyle="--")
+        axes.set_aspect("equal")
+        axes.set_title(f"{case.shape}, contact friction {case.contact_friction:g}", fontsize=9)
+        axes.set_ylabel("y (m)")
+    panels[-1].set_xlabel("x (m)")
+    return figure
+
+
+def _draw_slider(axes: Any, case: Case, state: State) -> None:
+    """Draw outline, contact point and pushing direction (black), and a circle's heading (red)."""
+    x, y, phi, s, fx, fy = state
+    c, si = math.cos(phi), math.sin(phi)
+    if case.shape == "circle":
+        angles = [2 * math.pi * k / 60 for k in range(61)]
+        body = [(case.radius_m * math.cos(a), case.radius_m * math.sin(a)) for a in angles]
+        side = math.pi - s / case.radius_m
+        contact = (case.radius_m * math.cos(side), case.radius_m * math.sin(side))
+        axes.plot([x, x + case.radius_m * c], [y, y + case.radius_m * si], color="tab:red", linewidth=0.8)
+    else:
+        h, w = case.length_m / 2, (case.length_m if case.shape == "square" else case.width_m) / 2
+        body = [(-h, w), (-h, -w), (h, -w), (h, w), (-h, w)]
+        contact = (-h, s)
+    axes.plot(
+        [x + c * bx - si * by for bx, by in body],
+        [y + si * bx + c * by for bx, by in body],
+        color="tab:blue",
+        linewidth=0.6,
+    )
+    contact_x, contact_y = x + c * contact[0] - si * contact[1], y + si * contact[0] + c * contact[1]
+    push = (
+        0.0 if case.controller == "open-loop" else (case.k_f + 1) * math.atan2(fy, fx) + case.k_y_rad_per_m * contact_y
+    )
+    axes.plot(contact_x, contact_y, "k.", markersize=3)
+    length = 0.5
+    axes.plot(
+        [contact_x - length * math.cos(push), contact_x],
+        [contact_y - length * math.sin(push), contact_y],
+        color="black",
+        linewidth=0.8,
+    )
+
+
+def _figure(width_in: float, height_in: float) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure

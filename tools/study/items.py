@@ -1,0 +1,127 @@
+"""The unit a study is cut into for workers: a few lanes of one shape, and what came of them.
+
+A worker gets one item at a time and answers with rows (one a lane, for `results.csv`) and arrays. An item that
+fails answers with rows that say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from robot_io.errors import PushError
+from sim_backend.lanes import LaneEnd, LaneResult, Timing
+from tools.study.grid import Case, Study, lane_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+STEPS_PER_ITEM = 1_700_000
+"""About a tenth of a second of work: enough to hide the hand-over, little enough to lose on an interruption."""
+MOST_LANES_PER_ITEM = 1000
+
+Row = dict[str, str | int | float]
+
+PARAMETER_COLUMNS = (
+    "lane", "shape", "length_m", "width_m", "radius_m", "pressure", "tau_max", "mu", "y0", "phi0", "s0",
+    "speed", "k_f", "k_y", "f_max", "controller",
+)  # fmt: skip
+RESULT_COLUMNS = (
+    "code", "steps", "x", "y", "phi", "s", "fx", "fy", "max_abs_y", "max_abs_y_c", "max_abs_theta_p",
+    "min_vn_over_speed", "steps_sticking", "steps_sliding_left", "steps_sliding_right", "error",
+)  # fmt: skip
+COLUMNS = PARAMETER_COLUMNS + RESULT_COLUMNS
+"""Units: m, rad, N, N*m, m/s; `code` is ok, edge, pull or error; a field that has no value is empty."""
+
+
+class LaneItem(msgspec.Struct, frozen=True):
+    """Some consecutive cases of one shape; `first` is the study's number of the first."""
+
+    first: int
+    cases: tuple[Case, ...]
+    timing: Timing
+
+
+class Part(msgspec.Struct, frozen=True):
+    """What came of one item: a row for each case, and named arrays."""
+
+    rows: list[Row]
+    arrays: dict[str, NDArray[np.float64]]
+
+
+def cut(study: Study) -> list[LaneItem]:
+    """Cut a study into items. How does not depend on the machine, so that any machine can finish it."""
+    size = max(1, min(MOST_LANES_PER_ITEM, STEPS_PER_ITEM // study.timing.steps))
+    items: list[LaneItem] = []
+    start = 0
+    for i in range(1, len(study.cases) + 1):
+        if i == len(study.cases) or i - start == size or study.cases[i].shape != study.cases[start].shape:
+            items.append(LaneItem(start, study.cases[start:i], study.timing))
+            start = i
+    return items
+
+
+def run_lane_item(item: LaneItem) -> Part:
+    """Run an item's lanes; arrays: `states`, shape (cases, records, 6), NaN after a lane's end."""
+    import numpy as np
+
+    from sim_backend.batch import run_batch
+
+    try:
+        results, states = run_batch([lane_of(case) for case in item.cases], item.timing)
+    except PushError as error:
+        return _failed(item, str(error))
+    except Exception as error:  # one bad item must not cost the study; its rows name the defect
+        return _failed(item, f"{type(error).__name__}: {error}")
+    rows = [
+        {**_parameters(item.first + i, case), **_result(result)}
+        for i, (case, result) in enumerate(zip(item.cases, results, strict=True))
+    ]
+    return Part(rows, {"states": np.asarray(states)})
+
+
+def _failed(item: LaneItem, sentence: str) -> Part:
+    import numpy as np
+
+    rows: list[Row] = [
+        {**_parameters(item.first + i, case), "code": LaneEnd.ERROR.name.lower(), "steps": 0, "error": sentence}
+        for i, case in enumerate(item.cases)
+    ]
+    return Part(rows, {"states": np.full((len(item.cases), item.timing.records, 6), np.nan)})
+
+
+def _parameters(number: int, case: Case) -> Row:
+    is_round = case.shape == "circle"
+    row: Row = {"lane": number, "shape": case.shape}
+    if is_round:
+        row["radius_m"] = case.radius_m
+    else:
+        row["length_m"] = case.length_m
+        row["width_m"] = case.length_m if case.shape == "square" else case.width_m
+    if not case.tau_max_Nm:
+        row["pressure"] = case.pressure
+    return row | {
+        "tau_max": lane_of(case).d_m * case.f_max_N,
+        "mu": case.contact_friction,
+        "y0": case.y0_m,
+        "phi0": case.phi0_rad,
+        "s0": case.s0_m,
+        "speed": case.speed_m_per_s,
+        "k_f": case.k_f,
+        "k_y": case.k_y_rad_per_m,
+        "f_max": case.f_max_N,
+        "controller": case.controller,
+    }
+
+
+def _result(result: LaneResult) -> Row:
+    names: Sequence[str] = RESULT_COLUMNS
+    values = (
+        result.end.name.lower(), result.steps, *result.final, result.max_abs_y_m, result.max_abs_y_c_m,
+        result.max_abs_theta_p_rad, result.min_normal_speed_ratio, result.steps_sticking, result.steps_left,
+        result.steps_right, "",
+    )  # fmt: skip
+    return dict(zip(names, values, strict=True))

@@ -1,0 +1,115 @@
+"""What `push sweep` needs to know of a study: its items, who runs them, and how their parts become results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import msgspec
+
+from tools.study.grid import Study
+from tools.study.hardware import (
+    COLUMNS as HARDWARE_COLUMNS,
+)
+from tools.study.hardware import (
+    check_flags,
+    hardware_items,
+    run_hardware_item,
+    sources,
+)
+from tools.study.hardware_summary import hardware_sentences, summarise_hardware
+from tools.study.items import COLUMNS, Part, cut, run_lane_item
+from tools.study.paper import sample_cases
+
+if TYPE_CHECKING:
+    from tools.study.store import Store
+
+ROOT = Path(__file__).resolve().parents[2]
+LANE_SOURCES = tuple(ROOT / name for name in ("sim_backend/batch.py", "sim_backend/shapes.py", "tools/study/items.py"))
+
+
+class Plan(NamedTuple):
+    """A study ready to run.
+
+    definition: all that its numbers depend on but the program text, which is `sources`. items: each with `.cases`.
+    prepare: called once here before workers start. write: makes the results from all parts, returns the summary and
+    the lines for people.
+    """
+
+    name: str
+    definition: object
+    sources: Sequence[Path]
+    items: Sequence[Any]
+    function: Callable[[Any], Part]
+    prepare: Callable[[], None]
+    write: Callable[[Store, list[Part]], tuple[dict[str, Any], list[str]]]
+
+
+def lanes_plan(study: Study) -> Plan:
+    """Return the plan of a study of lanes."""
+
+    def write(store: Store, parts: list[Part]) -> tuple[dict[str, Any], list[str]]:
+        return _write_lanes(study, store, parts)
+
+    return Plan(study.name, msgspec.to_builtins(study), LANE_SOURCES, cut(study), run_lane_item, compile_kernel, write)
+
+
+def hardware_plan(gains: tuple[float, float] | None, dt_s: float | None, open_loop: bool) -> Plan:
+    """Return the plan of the simulated experiment. Raises UsageError for flags it has no use for."""
+    check_flags(dt_s, open_loop)
+    items = hardware_items(gains)
+    definition = msgspec.to_builtins(items)
+    return Plan("hardware", definition, sources(ROOT), items, run_hardware_item, _nothing, _write_hardware)
+
+
+def compile_kernel() -> None:
+    """Compile the lanes' kernel once, here, so that the workers find it in numba's cache."""
+    from sim_backend.batch import run_batch
+    from sim_backend.lanes import Lane, Timing
+
+    run_batch([Lane(True, 0.5, 0.5, 0.3, 0.5, 0.0, 0.0, 0.0)], Timing(steps=1, record_every=1))
+
+
+def _nothing() -> None:
+    """Prepare nothing."""
+
+
+def _write_lanes(study: Study, store: Store, parts: list[Part]) -> tuple[dict[str, Any], list[str]]:
+    """Write results.csv, states.npz, summary.json and the figures."""
+    import numpy as np
+
+    from tools.study import figures as sweep_figures
+    from tools.study.summary import sentences, summarise
+
+    rows = [row for part in parts for row in part.rows]
+    states = np.concatenate([part.arrays["states"] for part in parts])
+    store.write_csv("results.csv", COLUMNS, rows)
+    store.write_arrays("states.npz", {"states": states})
+    summary = summarise(study, rows, states)
+    store.write_json("summary.json", summary)
+    title = f"{study.name}: {len(study.cases)} pushes of {study.timing.steps * study.timing.dt_s:g} s"
+    files = sweep_figures.save(sweep_figures.trajectories(study.cases, states, title), store.out, "trajectories")
+    if chosen := sample_cases(study.cases)[:8]:
+        shown = [study.cases[i] for i in chosen]
+        files += sweep_figures.save(sweep_figures.samples(shown, study.timing), store.out, "samples")
+    return summary | {"files": ["results.csv", "states.npz", "summary.json", *files]}, sentences(summary)
+
+
+def _write_hardware(store: Store, parts: list[Part]) -> tuple[dict[str, Any], list[str]]:
+    """Write results.csv, states.npz (slider poses, NaN after a run's end), summary.json and the figure."""
+    import numpy as np
+
+    from tools.study import figures as sweep_figures
+
+    rows = [row for part in parts for row in part.rows]
+    longest = max(len(part.arrays["slider"]) for part in parts)
+    states = np.full((len(parts), longest, 3), np.nan)
+    for i, part in enumerate(parts):
+        states[i, : len(part.arrays["slider"])] = part.arrays["slider"]
+    store.write_csv("results.csv", HARDWARE_COLUMNS, rows)
+    store.write_arrays("states.npz", {"states": states})
+    summary = summarise_hardware(rows, states)
+    store.write_json("summary.json", summary)
+    files = sweep_figures.save(sweep_figures.experiment(rows, states), store.out, "trajectories")
+    return summary | {"files": ["results.csv", "states.npz", "summary.json", *files]}, hardware_sentences(summary)
