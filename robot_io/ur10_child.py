@@ -125,17 +125,21 @@ def _sleep_until_next(deadline_ns: int) -> int:
 def hold_arm(job: ArmJob, record: SharedRecord) -> None:
     """Connect, report ready, publish until told to end. Raises DeviceError."""
     info = preflight(job.host)
-    with starting_threads_at(RECEIVER_PRIORITY if job.realtime_priority > 0 else 0):
+    threads_priority = RECEIVER_PRIORITY if job.realtime_priority > 0 else 0
+    with starting_threads_at(threads_priority):
         reader = ArmReader(job.host)
     reader.wait_flowing()
     hold = None
     if job.hold == "servo":
-        hold = ActiveHold(job.host, reader, job.held_pose_rad, job.held_pose_tolerance_rad)
+        with starting_threads_at(threads_priority):
+            hold = ActiveHold(job.host, reader, job.held_pose_rad, job.held_pose_tolerance_rad)
     forbid_new_descriptors()  # the wheel's own thread would connect again and restart its script
     gc.freeze()
     gc.disable()
     lock_memory()
     realtime = job.realtime_priority > 0 and try_realtime(job.realtime_priority)
+    if hold is not None:
+        hold.begin()  # from here on its watchdog waits 0.1 s at most: the slow preparations are done
     process = ArmProcess(job, record, reader, hold)  # publishes the first record
     _report(job, ready_line(info, realtime))
     process.run()

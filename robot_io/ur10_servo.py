@@ -42,7 +42,11 @@ SAFETY_ALLOWS = (1, 2)
 
 
 class ActiveHold:
-    """Holds the joints measured at construction (rad). Raises DeviceNotReady when that is not safe to begin."""
+    """Holds the joints measured at construction (rad). Raises DeviceNotReady when that is not safe to begin.
+
+    Construction starts the control script, `begin` arms its watchdog: nothing slow may come between `begin` and the
+    first `tick`, and no more than 0.1 s between two.
+    """
 
     def __init__(self, host: str, reader: ArmReader, held_pose_rad: Joints | None, tolerance_rad: float) -> None:
         start = reader.wait_flowing()
@@ -50,16 +54,26 @@ class ActiveHold:
         self.target: Joints = start.position
         self._tolerance_rad = tolerance_rad
         self._rtde = _control_interface(host)
+        self._host = host
         self._ended = False
         try:
             _wait_playing(host, reader)
+        except BaseException:
+            self.end()
+            raise
+
+    def begin(self) -> None:
+        """Arm the watchdog and command the first target. Raises DeviceNotReady, having ended, when it is refused."""
+        try:
             if not self._rtde.setWatchdog(WATCHDOG_HZ):
                 raise DeviceNotReady(
-                    "the control script refused the watchdog", where=host, do="Use hold = monitor, or try again."
+                    "the control script refused the watchdog", where=self._host, do="Use hold = monitor, or try again."
                 )
             if not self._command(FIRST_COMMAND_WITHIN_S):  # waits until the script is ready; later calls return at once
                 raise DeviceNotReady(
-                    "the control script refused the first target", where=host, do="Use hold = monitor, or try again."
+                    "the control script refused the first target",
+                    where=self._host,
+                    do="Use hold = monitor, or try again.",
                 )
         except BaseException:
             self.end()

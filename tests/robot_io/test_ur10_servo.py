@@ -65,6 +65,27 @@ def test_the_watchdog_is_set_before_the_first_target(robot, arm) -> None:
     assert robot.get("counters.watchdog_trips") == 0
 
 
+SLOW_PREPARATION = """
+import sys
+if "robot_io.ur10_child" in sys.orig_argv:
+    import time
+    from robot_io import process
+    process.lock_memory = lambda: time.sleep(0.3)
+"""
+
+
+def test_the_watchdog_does_not_wait_for_slow_preparations(robot, tmp_path, monkeypatch) -> None:
+    """Locking the memory of a process takes long on a busy host, longer than the watchdog waits."""
+    (tmp_path / "sitecustomize.py").write_text(SLOW_PREPARATION)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with Ur10(robot.host, hold="servo", held_pose_rad=HELD) as arm:
+        wait_until(lambda: arm.read().servo, "it holds")
+        packets = arm.read().packets
+        wait_until(lambda: arm.read().packets > packets + 30, "for a while")
+        assert arm.read().servo
+    assert robot.get("counters.watchdog_trips") == 0
+
+
 def test_ends_by_stopping_its_script(robot) -> None:
     """Not by the watchdog; an overloaded host may starve the child for 0.1 s, hence three tries."""
     trips = []
