@@ -1,7 +1,7 @@
 """An emulated Ridgeback behind a rosbridge websocket: server, ROS graph, the robot's nodes, motion capture.
 
 Single-threaded inside an event loop. The base itself is the `source`: every command that gets through is given
-to it with its arrival time. `faults` breaks things on request.
+to it with its arrival time.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from sim_backend.ridgeback_settings import BridgeSettings, RidgebackSettings
 from sim_backend.ros_graph import RosGraph, Topic
 from sim_backend.ros_types import RosTypes
 from sim_backend.rosapi import RosApi
-from sim_backend.rosbridge_faults import BridgeFaults
 from sim_backend.rosbridge_ops import Session
 from sim_backend.websocket_server import WebSocketPeer, WebSocketServer
 
@@ -77,7 +76,6 @@ class RosbridgeEmulator:
             ping_interval_s=bridge.ping_interval_s,
             ping_timeout_s=bridge.ping_timeout_s,
         )
-        self.faults = BridgeFaults(loop, self)
 
     @property
     def url(self) -> str:
@@ -104,7 +102,6 @@ class RosbridgeEmulator:
 
     def close(self) -> None:
         """Stop everything; idempotent."""
-        self.faults.close()
         self.nodes.close()
         self.mocap.close()
         self.server.close()

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.event_loop import EventLoop, Timer
 from robot_io.messages import BodyTwist, Pose2D
+from sim_backend.rosbridge_emulator import RosbridgeEmulator
 from sim_backend.websocket_server import WebSocketPeer
-
-if TYPE_CHECKING:
-    from sim_backend.rosbridge_emulator import RosbridgeEmulator
 
 _JOYSTICK_PERIOD_NS = NS_PER_S // 20
 _BURST_OUT_NS = 1_000_000

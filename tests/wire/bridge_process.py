@@ -21,6 +21,7 @@ from robot_io.config import TopicsConfig
 from robot_io.event_loop import EventLoop
 from robot_io.messages import BodyTwist, Pose2D
 from sim_backend.ridgeback_settings import BridgeSettings, RidgebackSettings
+from sim_backend.rosbridge_faults import BridgeFaults
 from sim_backend.rosbridge_standalone import StandaloneBase, standalone_emulator
 
 ROOT = Path(__file__).parents[2]
@@ -32,6 +33,7 @@ def serve() -> None:
     bridge = msgspec.convert(options.get("bridge", {}), BridgeSettings)
     loop = EventLoop()
     emulator = standalone_emulator(loop, port=0, settings=settings, bridge=bridge)
+    faults = BridgeFaults(loop, emulator)
     heard: list[tuple[int, float, float, float]] = []
     source = emulator.nodes._source
     assert isinstance(source, StandaloneBase)
@@ -76,12 +78,13 @@ def serve() -> None:
                     else value
                     for value in order.get("args", [])
                 ]
-                getattr(emulator.faults, order["do"])(*arguments)
+                getattr(faults, order["do"])(*arguments)
                 answer({"done": order["do"], "now_ns": time.monotonic_ns()})
 
     loop.add_fd(0, request)
     answer({"url": emulator.url})
     loop.run()
+    faults.close()
     emulator.close()
     loop.close()
 
