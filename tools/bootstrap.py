@@ -87,7 +87,10 @@ def install(kind: str, pip: list[str], venv: Path) -> None:
     uv = str(venv / "bin" / "uv")
     wanted = ["-c", str(ROOT / "constraints.txt"), "-e", f"{ROOT}{EXTRAS[kind]}"]
     if Path(uv).exists() or run(*pip, "install", "-q", "--disable-pip-version-check", "uv"):
-        done = run(uv, "pip", "install", "-q", "--python", str(venv / "bin" / "python"), *wanted, quiet=False)
+        # Compiled at once, as pip does: matplotlib and numpy would otherwise be compiled by the first runs, or,
+        # where PYTHONDONTWRITEBYTECODE is set, by every process of every run.
+        into = ["--compile-bytecode", "--python", str(venv / "bin" / "python")]
+        done = run(uv, "pip", "install", "-q", *into, *wanted, quiet=False)
     else:
         done = run(*pip, "install", "-q", "--disable-pip-version-check", *wanted, quiet=False)
     if not done:
