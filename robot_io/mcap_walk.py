@@ -11,8 +11,9 @@ from __future__ import annotations
 import io
 import os
 import struct
+import sys
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -34,16 +35,24 @@ _SCHEMA_LIMIT = 1 << 20
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
+_MESSAGE_OPCODE = int(Opcode.MESSAGE)
 _FOOTER = struct.Struct("<BQQQI")
 
 LogItem = Header | Schema | Channel | Message | Attachment | Metadata
 
 
-def walk(path: Path, *, finished: bool = True) -> Iterator[LogItem]:
+Grown = Callable[[int], int]
+"""Waits until a log has at least so many bytes or is no longer written, and returns its size."""
+
+
+def walk(path: Path, *, finished: bool = True, grown: Grown | None = None) -> Iterator[LogItem]:
     """Yield the verified records of a log; each Schema and Channel once, before its first use.
 
-    With `finished=False` everything before the first damage is yielded. Raises UsageError or LogDamaged.
+    With `finished=False` everything before the first damage is yielded. With `grown` the log may still be written
+    while it is read, and may be damaged in any part not yet yielded. Raises UsageError or LogDamaged.
     """
+    if grown is not None:
+        grown(len(MAGIC))
     try:
         file = path.open("rb")
     except OSError as error:
@@ -52,21 +61,21 @@ def walk(path: Path, *, finished: bool = True) -> Iterator[LogItem]:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MAGIC)) != MAGIC:
             raise LogDamaged("this is no MCAP file", where=str(path), do="Give a log written by `push run`")
-        if finished:
+        if finished and grown is None:
             file.seek(max(0, size - len(MAGIC)))
             if size < 2 * len(MAGIC) or file.read(len(MAGIC)) != MAGIC:
                 raise _truncated(path)
             file.seek(len(MAGIC))
-        yield from _Walk(path, file, size).items()
+        yield from _Walk(path, file, grown or (lambda _: size)).items()
 
 
 class _Walk:
     """One pass over a file, from behind its magic."""
 
-    def __init__(self, path: Path, file: BinaryIO, size: int) -> None:
+    def __init__(self, path: Path, file: BinaryIO, grown: Grown) -> None:
         self._path = path
         self._file = file
-        self._size = size
+        self._grown = grown
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
 
@@ -99,12 +108,13 @@ class _Walk:
             crc = zlib.crc32(body, zlib.crc32(head, crc))
 
     def _record(self) -> tuple[bytes, bytes]:
+        at = self._file.tell() + _HEAD.size
+        self._grown(at)
         head = self._file.read(_HEAD.size)
-        left = self._size - self._file.tell()
         if len(head) < _HEAD.size:
             raise _truncated(self._path)
         _, length = _HEAD.unpack(head)
-        if length > left:
+        if at + length > self._grown(at + min(length, RECORD_LIMIT)):
             raise _truncated(self._path)
         if length > RECORD_LIMIT:
             raise _altered(self._path, f"a record of {length} bytes is larger than any of ours")
@@ -127,17 +137,21 @@ class _Walk:
             at += _HEAD.size
             if length > len(data) - at:
                 raise _altered(self._path, "a record reaches beyond its chunk")
+            if opcode == _MESSAGE_OPCODE:
+                yield self._message(data, at, length)
+                at += length
+                continue
             body = data[at : at + length]
             at += length
-            if opcode == Opcode.MESSAGE:
-                yield self._message(body)
-            elif opcode == Opcode.SCHEMA:
+            if opcode == Opcode.SCHEMA:
                 yield from self._schema(Schema.read(_stream(body)))
             elif opcode == Opcode.CHANNEL:
                 yield from self._channel(Channel.read(_stream(body)))
 
-    def _message(self, body: bytes) -> Message:
-        channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
+    def _message(self, data: bytes, at: int, length: int) -> Message:
+        if length < _MESSAGE.size:
+            raise _altered(self._path, "a message is shorter than its head")
+        channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, at)
         if channel_id not in self._channels:
             raise _altered(self._path, f"a message of channel {channel_id}, which is not declared")
         return Message(
@@ -145,7 +159,7 @@ class _Walk:
             sequence=sequence,
             log_time=log_time,
             publish_time=publish_time,
-            data=body[_MESSAGE.size :],
+            data=data[at + _MESSAGE.size : at + length],
         )
 
     def _schema(self, schema: Schema) -> Iterator[Schema]:
@@ -168,15 +182,16 @@ class _Walk:
 
     def _check_summary(self) -> None:
         start = self._file.tell()
+        size = self._grown(sys.maxsize)
         crc = 0
-        left = self._size - start - len(MAGIC) - 4
+        left = size - start - len(MAGIC) - 4
         while left > 0:
             block = self._file.read(min(left, 1 << 20))
             if not block:
                 break
             crc = zlib.crc32(block, crc)
             left -= len(block)
-        self._file.seek(max(start, self._size - len(MAGIC) - _FOOTER.size))
+        self._file.seek(max(start, size - len(MAGIC) - _FOOTER.size))
         tail = self._file.read(_FOOTER.size + len(MAGIC))
         if left != 0 or tail[_FOOTER.size :] != MAGIC:
             raise _truncated(self._path)

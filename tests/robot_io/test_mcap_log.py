@@ -22,6 +22,7 @@ from robot_io.errors import LogDamaged, UsageError
 from robot_io.mcap_log import McapLog
 from robot_io.mcap_read import read_log, read_summary
 from robot_io.mcap_recover import recover
+from robot_io.mcap_walk import walk
 
 CONFIG = 'kind = "sim"\n'
 START_NS = 1_600_000_000_000_000_000
@@ -266,6 +267,29 @@ def test_a_huge_record_length_is_refused(tmp_path):
     path.write_bytes(b"\x89MCAP0\r\n" + struct.pack("<BQ", 1, 2**62) + b"\x89MCAP0\r\n")
     with pytest.raises(LogDamaged):
         list(read_log(path))
+
+
+def test_a_message_shorter_than_its_head_is_refused(tmp_path):
+    """In a chunk whose checksums are right, with another message behind it that would lend it bytes."""
+    schema = struct.pack("<HI", 1, 1) + b"s" + struct.pack("<I", 7) + b"ros2msg" + struct.pack("<I", 0)
+    channel = struct.pack("<HHI", 1, 1, 2) + b"/t" + struct.pack("<I", 3) + b"cdr" + struct.pack("<I", 0)
+    for length in range(22):
+        data = record(3, schema) + record(4, channel) + record(5, bytes([1, 0] * 11)[:length]) + record(5, bytes(22))
+        body = struct.pack("<QQQII", 0, 0, len(data), zlib.crc32(data), 0) + struct.pack("<Q", len(data)) + data
+        raw = b"\x89MCAP0\r\n" + record(1, struct.pack("<I", 4) + b"ros2" + struct.pack("<I", 0)) + record(6, body)
+        path = tmp_path / f"{length}.mcap"
+        path.write_bytes(raw + record(15, struct.pack("<I", zlib.crc32(raw))) + b"\x89MCAP0\r\n")
+        with pytest.raises(LogDamaged, match="shorter than its head"):
+            list(walk(path))
+
+
+def test_a_log_still_being_written_is_read_as_far_as_it_goes(whole):
+    """`grown` is asked before every read, never for more than a record, and for the end last."""
+    size, asked = whole.stat().st_size, []
+    assert list(walk(whole, grown=lambda wanted: asked.append(wanted) or size)) == list(walk(whole))
+    assert asked[-1] > size, "to the end"
+    assert asked[:-1] == sorted(asked[:-1])
+    assert max(asked[:-1]) < size
 
 
 WRITER = """

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import base64
+import contextlib
+import itertools
 import json
 import math
 import subprocess
 import sys
+import time
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,7 @@ from tools.cli import main
 from tools.log.run_log import RunLog
 from tools.report import process as report_process
 from tools.report.page import page, run_mark, write_report
+from tools.report.process import ReportProcess
 from tools.report.run_data import read_run
 from tools.report.words import baseline_of, differences, tiles, verdict
 
@@ -359,6 +363,60 @@ def test_a_report_that_fails_is_said_and_fails_nothing(tmp_path, capsys, monkeyp
     run_command.report(summary, tmp_path, None)
     assert summary["report"] is None
     assert "took longer than" in capsys.readouterr().err
+
+
+def reader_of(process: ReportProcess, log: Path, *, at_least: int) -> None:
+    """Wait until the process has the log open and has read so many bytes of it."""
+    pid, deadline_s = process._process.pid, time.monotonic() + 30.0
+    while True:
+        for entry in Path(f"/proc/{pid}/fd").iterdir():
+            with contextlib.suppress(OSError):
+                if entry.readlink() == log:
+                    told = Path(f"/proc/{pid}/fdinfo/{entry.name}").read_text()
+                    if int(told.split()[1]) >= at_least:
+                        return
+        assert process._process.poll() is None, "it ended"
+        assert time.monotonic() < deadline_s, "it does not read"
+        time.sleep(0.01)
+
+
+def test_a_log_is_read_while_it_grows(ran, tmp_path):
+    whole = (ran[0] / "run.mcap").read_bytes()
+    log = tmp_path / "run.mcap"
+    process = ReportProcess(log, tmp_path / "report.html")  # before there is a log
+    try:
+        with log.open("wb", buffering=0) as file:
+            for begin, end in itertools.pairwise((0, 5, 100, len(whole) // 2, len(whole) - 3, len(whole))):
+                file.write(whole[begin:end])
+                if begin:
+                    reader_of(process, log, at_least=min(begin, len(whole) // 4))
+        assert process.make() == ""
+    finally:
+        process.drop()
+    write_report(log, tmp_path / "again.html")
+    assert (tmp_path / "report.html").read_bytes() == (tmp_path / "again.html").read_bytes()
+
+
+def test_a_log_that_stops_growing_is_truncated(ran, tmp_path):
+    whole = (ran[0] / "run.mcap").read_bytes()
+    log = tmp_path / "run.mcap"
+    log.write_bytes(whole[: len(whole) // 2])
+    process = ReportProcess(log, tmp_path / "report.html")
+    try:
+        reader_of(process, log, at_least=100)
+        assert "truncated" in process.make()
+    finally:
+        process.drop()
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_a_report_nobody_wants_any_more_ends_by_itself(tmp_path):
+    process = ReportProcess(tmp_path / "run.mcap", tmp_path / "report.html")
+    process._process.stdin.close()
+    process._process.stdin = None
+    assert process._process.wait(30.0) == 1
+    process.drop()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_config_in_the_log_is_what_is_read(ran):

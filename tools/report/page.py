@@ -20,10 +20,12 @@ from string import Template
 from typing import Any
 
 from robot_io.errors import EnvironmentFault, PushError, UsageError
+from robot_io.mcap_walk import Grown
 from safety.faults import FAULTS
 from tools.report import words
 from tools.report.run_data import RunData, read_run
 from tools.report.style import PHASE_COLOURS, phase_spans
+from tools.report.written_log import WrittenLog
 
 TEMPLATE = Path(__file__).with_name("page.html")
 MOST_SUMMARY_BYTES = 4 << 20
@@ -38,15 +40,17 @@ CAPTIONS = {
 }
 
 
-def write_report(log: Path, out_html: Path) -> dict[str, bytes]:
-    """Write the page of a finished log; `summary.json` beside the log is used when it is there. Returns the PNGs.
+def write_report(log: Path, out_html: Path, *, grown: Grown | None = None) -> dict[str, bytes]:
+    """Write the page of a log; `summary.json` beside the log is used when it is there. Returns the PNGs.
+
+    `grown`: see `walk`, for a log that is still being written.
 
     Raises UsageError (no such log, or `out_html` is the report of another run), LogDamaged (a log not to be
     trusted), EnvironmentFault (the page cannot be written).
     """
     from tools.report.figures import figures
 
-    run = read_run(log)
+    run = read_run(log, grown=grown)
     mark = run_mark(run)
     if not may_write(out_html, mark):
         raise UsageError("there is already a report of another run", where=str(out_html), do="Give another --out")
@@ -192,7 +196,7 @@ def _esc(text: str) -> str:
 
 
 def main(argv: Sequence[str]) -> int:
-    """LOG HTML PARENT: load, wait for a byte on stdin, write the report; die with process PARENT.
+    """LOG HTML PARENT: read the log until a byte on stdin says it is finished, write the report; die with PARENT.
 
     One line on stderr says what went wrong.
     """
@@ -202,10 +206,9 @@ def main(argv: Sequence[str]) -> int:
     die_with_parent(int(argv[2]))
     importlib.import_module("tools.report.figures")
     warm_up()
-    if not sys.stdin.buffer.read(1):
-        return 1
+    log = Path(argv[0])
     try:
-        write_report(Path(argv[0]), Path(argv[1]))
+        write_report(log, Path(argv[1]), grown=WrittenLog(log, sys.stdin.fileno()).grown)
     except PushError as error:
         print(error, file=sys.stderr)
         return error.exit_code

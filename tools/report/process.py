@@ -1,7 +1,7 @@
 """The report of a run, made in a process of its own: a report that cannot be made is no failure of the run.
 
-Level `sim` starts it with the run, so that its imports (most of its time) pass beside the run; a wall-clock run
-starts it only after its end, because nothing may disturb the loop.
+Level `sim` starts it with the run, so that its imports and the reading of the log (most of its time) pass beside the
+run; a wall-clock run starts it only after its end, because nothing may disturb the loop.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ TIMEOUT_S = 60.0
 
 
 class ReportProcess:
-    """`python -m tools.report.page LOG HTML PARENT`, which waits for a byte on stdin before it reads the log."""
+    """`python -m tools.report.page LOG HTML PARENT`, which reads the log as it grows; a byte on stdin: it is whole."""
 
     def __init__(self, log: Path, page: Path) -> None:
         """Start it. Raises EnvironmentFault when no process can be started."""
@@ -36,7 +36,7 @@ class ReportProcess:
             raise EnvironmentFault(f"no process for the report: {error.strerror}") from None
 
     def make(self) -> str:
-        """Let it read the finished log and write the page; return why it could not, "" when it did."""
+        """Tell it that the log is finished, and let it write the page; return why it could not, "" when it did."""
         try:
             _, said = self._process.communicate(b"G", timeout=TIMEOUT_S)
         except subprocess.TimeoutExpired:

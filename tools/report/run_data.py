@@ -14,7 +14,7 @@ from robot_io.clock import NS_PER_S
 from robot_io.config import RigConfig, rig_from_toml
 from robot_io.errors import LogDamaged, PushError
 from robot_io.log_messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
-from robot_io.mcap_walk import walk
+from robot_io.mcap_walk import Grown, walk
 from robot_io.planar_pose import wrap_angle, yaw_from_quaternion
 from robot_io.ros_messages import POSE_STAMPED
 from robot_io.tick import TICK_CDR, ControlTick, Phase
@@ -85,12 +85,15 @@ class RunData:
     """Of `facts`, those known when the run began: with the config they tell one run from another."""
 
 
-def read_run(path: Path) -> RunData:
-    """Read a finished log. Raises UsageError (no such file) and LogDamaged (not to be trusted, or not a run's)."""
+def read_run(path: Path, *, grown: Grown | None = None) -> RunData:
+    """Read a log to its end. Raises UsageError (no such file) and LogDamaged (not to be trusted, or not a run's).
+
+    `grown`: see `walk`, for a log that is still being written.
+    """
     reader = _Reader(path)
     topics: dict[int, str] = {}
     schemas: dict[int, bytes] = {}
-    for item in walk(path):
+    for item in walk(path, grown=grown):
         if isinstance(item, Message):
             reader.message(topics[item.channel_id], item.log_time, item.data)
         elif isinstance(item, Channel):
