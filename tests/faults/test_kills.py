@@ -17,7 +17,7 @@ from robot_io.log_messages import SAFETY_EVENT
 from robot_io.tick import TICK_CDR
 from safety.faults import FAULTS
 from tests.faults.kill_rounds import Round, pushing, strike, within
-from tests.host_watch import HostWatch, repeated_when_the_host_stalls
+from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import PUSH, QUICK, ROOT, messages, stands, started, world_of
 
 KILL, STOP = signal.SIGKILL, signal.SIGSTOP
@@ -30,18 +30,6 @@ GATE_GONE_REST_MS = 330.0
 ARM_GONE_ZERO_MS = 30.0
 """One tick, and two on the wire."""
 AGAIN = 8
-
-
-@pytest.fixture(scope="module")
-def state(tmp_path_factory):
-    return tmp_path_factory.mktemp("state")
-
-
-@pytest.fixture(scope="module")
-def host():
-    watch = HostWatch()
-    yield watch
-    watch.close()
 
 
 def replays(folder: Path) -> None:

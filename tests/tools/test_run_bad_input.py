@@ -10,7 +10,7 @@ import time
 import pytest
 import serial
 
-from tests.host_watch import HostWatch, repeated_when_the_host_stalls
+from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished, one_error, started
 from tests.ur_emulator_process import EmulatorProcess as UrProcess
 from tests.ur_emulator_process import fresh_address
@@ -27,18 +27,6 @@ host = "{host}"
 [base]
 url = "{url}"
 """
-
-
-@pytest.fixture(scope="module")
-def state(tmp_path_factory):
-    return tmp_path_factory.mktemp("state")
-
-
-@pytest.fixture
-def host():
-    watch = HostWatch()
-    yield watch
-    watch.close()
 
 
 def push_fails(state, tmp_path, code, *argv, also_plain=True):

@@ -18,24 +18,12 @@ from mcap_ros2.decoder import DecoderFactory
 
 from robot_io.mcap_read import read_summary
 from robot_io.tick import TICK_CDR, Phase
-from tests.host_watch import HostWatch, repeated_when_the_host_stalls
+from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import PUSH, QUICK, ROOT, Run, finished, messages, one_error, stands, started, world_of
 from tests.ur_emulator_process import wait_until
 
 DISTANCE_M = 0.2
 FILES = {"run.mcap", "config.toml", "summary.json", "processes.json"}
-
-
-@pytest.fixture(scope="module")
-def state(tmp_path_factory):
-    return tmp_path_factory.mktemp("state")
-
-
-@pytest.fixture(scope="module")
-def host():
-    watch = HostWatch()
-    yield watch
-    watch.close()
 
 
 @pytest.fixture(scope="module")
@@ -277,6 +265,11 @@ class Terminal:
             except BlockingIOError:
                 time.sleep(0.01)
 
+    def all_shown(self):
+        with contextlib.suppress(BlockingIOError):
+            self.shown += os.read(self.fd, 65536)
+        return self.shown[-600:].decode(errors="replace")
+
     def close(self):
         os.close(self.fd)
         os.close(self.theirs)
@@ -295,7 +288,8 @@ def test_on_a_terminal_any_key_stops(state, tmp_path, host):
         terminal.wait_for(b"PUSH ")
         assert b"\r" in terminal.shown
         os.write(terminal.fd, b" ")
-        assert run.process.wait(20.0) == 130
+        code = run.wait(20.0).code
+        assert code == 130, terminal.all_shown()
         run.wait_gone(3.0)
     assert termios.tcgetattr(terminal.theirs) == before
     terminal.close()
