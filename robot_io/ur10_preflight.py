@@ -27,7 +27,7 @@ GREETING = "Connected: Universal Robots Dashboard Server"
 
 _ASK_PROTOCOL_2 = bytes.fromhex("0005560002")
 _ASK_VERSION = bytes.fromhex("000376")
-_ADVICE_CABLE = "Check that the robot is switched on, the cable and the address, and run `push doctor`."
+_ADVICE_CABLE = "Check that the robot is switched on, the cable and the address"
 
 
 def preflight(host: str) -> DeviceInfo:

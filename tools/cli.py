@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.util
 import os
 import select
 import sys
@@ -58,11 +57,6 @@ COMMANDS = {
         ("push sweep --out sweeps/paper", "push sweep my-grid.toml --out sweeps/mine --resume"),
     ),
     "tune": Command("tools.tune", "map of the gains over simulated pushes", ("push tune", "push tune --json")),
-    "doctor": Command(
-        "tools.doctor_command",
-        "probe each device, read-only, and name the fix",
-        ("push doctor emulated", "push doctor thing --json"),
-    ),
     "emulate": Command(
         "tools.emulate_command",
         "the wire emulators alone, until stopped",
@@ -94,11 +88,6 @@ class Parser(argparse.ArgumentParser):
         raise UsageError(message, where="command line", do=f"`{self.prog} --help` shows how")
 
 
-def available() -> dict[str, Command]:
-    """Return the commands of this build."""
-    return {name: command for name, command in COMMANDS.items() if importlib.util.find_spec(command.module)}
-
-
 def main(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; never raises but for SystemExit of `--help`."""
     keep_standard_descriptors()
@@ -125,8 +114,6 @@ def dispatch(argv: Sequence[str]) -> int:
     name = " ".join(argv[:2]) if " ".join(argv[:2]) in COMMANDS else " ".join(argv[:1])
     if name not in COMMANDS:
         return _overview(argv)
-    if name not in available():
-        raise UsageError(f"`push {name}` is not part of this build", do="`push --help` lists the commands")
     module = importlib.import_module(COMMANDS[name].module)
     args = parser_of(name, module).parse_args(list(argv[len(name.split()) :]))
     return int(module.run(args))
@@ -148,16 +135,15 @@ def parser_of(name: str, module: ModuleType) -> Parser:
 
 def _overview(argv: Sequence[str]) -> int:
     """Answer `push`, `push --help`, `push --version`, a first word of two, and words that are no command."""
-    commands = available()
     first = argv[0] if argv else "--help"
-    group = {name: command for name, command in commands.items() if name.startswith(f"{first} ")}
+    group = {name: command for name, command in COMMANDS.items() if name.startswith(f"{first} ")}
     if first == "--version":
         from importlib.metadata import version
 
         print(f"push {version('single-point-push')}")
         return 0
     if first in ("-h", "--help", "help") or (group and set(argv[1:]) <= {"-h", "--help"}):
-        shown = group or commands
+        shown = group or COMMANDS
         width = max(len(name) for name in shown)
         lines = [f"  {name.ljust(width)}  {command.summary}" for name, command in shown.items()]
         example = next(iter(shown.values())).examples[0]
@@ -170,7 +156,7 @@ def _overview(argv: Sequence[str]) -> int:
         raise UsageError(f"`push {first}` needs one of: {', '.join(name.split()[1] for name in group)}")
     import difflib
 
-    near = difflib.get_close_matches(first, [name.split()[0] for name in commands], n=1)
+    near = difflib.get_close_matches(first, [name.split()[0] for name in COMMANDS], n=1)
     hint = f"Did you mean `push {near[0]}`?" if near else "`push --help` lists the commands"
     raise UsageError(f"there is no command `{first}`", do=hint)
 

@@ -16,6 +16,7 @@ import pytest
 
 from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import blame_the_host
+from tools.cli import COMMANDS
 from tools.fault_table import table
 from tools.rig_reference import reference
 
@@ -74,6 +75,14 @@ def test_readme_shell_blocks_run(tmp_path):
     assert (tmp_path / "runs/six/summary.json").exists()
 
 
+def test_no_word_of_the_program_names_a_command_that_is_not_there():
+    """Advice such as "run `push NAME`" must work when somebody follows it."""
+    for source in [*PAGES, *(ROOT / "robot_io").rglob("*.py"), *(ROOT / "tools").rglob("*.py")]:
+        for line in source.read_text().splitlines():
+            for words in re.findall(r"`push ([a-z]+(?: [a-z]+)?)", line):
+                assert words in COMMANDS or words.split()[0] in COMMANDS, f"{source.name} names `push {words}`"
+
+
 def python_blocks():
     return re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
 
@@ -97,7 +106,7 @@ def test_readme_driver_snippets_work(tmp_path):
         for block in blocks:
             code = block.replace("/dev/ttyUSB0", where["port"]).replace("192.168.131.40", where["host"])
             code = code.replace("ws://192.168.131.1:9090", where["url"])
-            code = "import time\nfrom robot_io.messages import BodyTwist\n" + code
+            assert len([line for line in block.splitlines() if line.strip()]) <= 5
             done = subprocess.run(
                 [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=30, check=False
             )
