@@ -1,4 +1,4 @@
-"""Every packet of the sensor, in order: tare sums, or bias, rotation, sign and filter, each with its own dt."""
+"""Every packet of the sensor, in order: sums for tare and check; bias, rotation, sign, filter, each with its own dt."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from control.settings import Settings
 from control.wrench import force_on_slider_world, low_pass
-from robot_io.ft300_tare import add
+from robot_io.ft300_tare import TareSums, add
 from robot_io.tick import ControlState, FtReading, Phase
 
 VALID_FOR_NS = 100_000_000
@@ -24,8 +24,8 @@ def sense(
     if not readings:
         valid = state.force_valid and now_ns - state.last_reading_ns <= VALID_FOR_NS
         return state if valid == state.force_valid else replace(state, force_valid=valid)
-    if state.phase == Phase.TARE:
-        return _sum_up(settings, state, readings)
+    if state.phase in (Phase.TARE, Phase.CHECK):
+        state = replace(state, tare=_sum_up(settings, state, readings))
     if not state.tared:
         return replace(state, last_reading_ns=readings[-1].received_ns)
     control = settings.control
@@ -50,10 +50,10 @@ def in_contact(settings: Settings, state: ControlState) -> bool:
     return state.force_valid and math.hypot(force[0], force[1]) >= settings.control.force_min_N
 
 
-def _sum_up(settings: Settings, state: ControlState, readings: tuple[FtReading, ...]) -> ControlState:
+def _sum_up(settings: Settings, state: ControlState, readings: tuple[FtReading, ...]) -> TareSums:
     wanted = settings.tare_readings
     sums = state.tare
     for reading in readings:
         if sums.count < wanted and reading.received_ns > state.phase_since_ns:
             sums = add(sums, (*reading.force, *reading.torque), wanted)
-    return replace(state, tare=sums, last_reading_ns=readings[-1].received_ns)
+    return sums

@@ -19,8 +19,6 @@ SETTLE_PACKETS = 20
 """Packets of each device before the start is believed."""
 REST_SPEED_M_PER_S = 0.01
 REST_NS = 300_000_000
-CHECK_NS = 700_000_000
-"""The post-run check waits this long at rest, so that the filter has forgotten the contact."""
 OVERDUE_CONTACT_M = 0.5
 """No contact this far beyond where it was expected: the object is not there."""
 BACKWARD_RAD = math.pi / 2
@@ -56,7 +54,7 @@ def advance(
     if phase == Phase.RETREAT:
         return _retreat(settings, state, inp, contact)
     if phase == Phase.CHECK:
-        return _check(state, inp)
+        return _check(settings, state, inp)
     return replace(state, speed=0.0)
 
 
@@ -239,8 +237,11 @@ def _retreat(settings: Settings, state: ControlState, inp: TickInput, contact: t
     return replace(state, speed=speed, theta_p=math.pi)
 
 
-def _check(state: ControlState, inp: TickInput) -> ControlState:
-    if not _rested(state, inp.now_ns, CHECK_NS):
-        return replace(state, speed=0.0)
-    force = state.force_world
-    return _enter(state, Phase.DONE, inp.now_ns, speed=0.0, residual_N=math.hypot(force[0], force[1], force[2]))
+def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
+    """Compare the mean of as many readings as the tare took, at rest again, with the tare."""
+    if not _rested(state, inp.now_ns, REST_NS):
+        return replace(state, speed=0.0, tare=TareSums())
+    if state.tare.count < settings.tare_readings:
+        return state
+    mean = judge(state.tare, settings.ft.noise_force_N, settings.ft.noise_torque_Nm).tare.bias
+    return _enter(state, Phase.DONE, inp.now_ns, residual_N=math.dist(mean[:3], state.bias_force))

@@ -161,7 +161,7 @@ def test_the_arm_is_held_and_the_sensor_reads_its_offset_out_of_contact():
 def test_noise_is_as_large_as_the_rig_says_and_differs_by_seed():
     world, other = World(RIG, 0, START), World(RIG, 1, START)
     readings = [world.read_ft(START + k * 10 * MS) for k in range(2000)]
-    for axis, sigma in enumerate([0.3] * 3 + [0.005] * 3):
+    for axis, sigma in enumerate([1.2] * 3 + [0.03] * 3):
         values = [r[axis] for r in readings]
         mean = sum(values) / len(values)
         spread = math.sqrt(sum((v - mean) ** 2 for v in values) / len(values))
