@@ -50,7 +50,10 @@ def digest_of_inputs() -> str:
 
 
 def choose_python() -> str:
-    """Return the interpreter to use: this one, or an older one beside it when this one is too new for the wheels."""
+    """Return the interpreter to use: this one, or an older one beside it when this one is too new for the wheels.
+
+    Of an active environment, the one it was made from: `.venv` cannot be made from itself.
+    """
     if sys.version_info[:2] < OLDEST:
         this = ".".join(map(str, sys.version_info[:2]))
         raise SetUpError(
@@ -62,7 +65,7 @@ def choose_python() -> str:
             other = shutil.which(name)
             if other and run(other, "-c", "import venv"):
                 return other
-    return sys.executable
+    return os.path.realpath(getattr(sys, "_base_executable", sys.executable))
 
 
 def make_venv(python: str, venv: Path) -> list[str]:

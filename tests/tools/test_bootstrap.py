@@ -63,6 +63,22 @@ def test_newer_python_gives_way_to_one_the_wheels_are_made_for(monkeypatch, tmp_
     assert bootstrap.choose_python() == str(older)
 
 
+def test_an_active_environment_of_ours_is_not_made_from_itself(tmp_path):
+    """`source .venv/bin/activate`, then `make test`: python3 is that of `.venv`, and must not be told to remake it."""
+    outside = subprocess.run(
+        [sys.executable, "-c", "import sys; print(sys._base_executable)"], capture_output=True, text=True, check=True
+    ).stdout.strip()
+    venv = tmp_path / ".venv"
+    subprocess.run([outside, "-m", "venv", "--without-pip", str(venv)], check=True, timeout=60)
+    ask = "from tools import bootstrap; print(bootstrap.choose_python())"
+    chosen = [
+        subprocess.run([python, "-c", ask], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60).stdout
+        for python in (outside, str(venv / "bin" / "python3"))
+    ]
+    assert chosen[0] == chosen[1]
+    assert str(tmp_path) not in chosen[1]
+
+
 @pytest.fixture
 def recorded(monkeypatch, tmp_path):
     """Set-up whose commands are recorded instead of run; uv is there when asked for by name."""
