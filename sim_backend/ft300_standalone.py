@@ -28,12 +28,13 @@ class ConstantWrench:
     ) -> None:
         if (step_after_s is None) != (step_wrench is None):
             raise UsageError("a step needs both its time and its wrench", do="Give --step-after-s and --step-wrench")
-        if step_after_s is not None and not (math.isfinite(step_after_s) and step_after_s >= 0):
+        step_ns = math.inf if step_after_s is None else step_after_s * NS_PER_S
+        if step_after_s is not None and not 0.0 <= step_ns < math.inf:
             raise UsageError(f"a step after {step_after_s} s cannot be", do="Give seconds from the start, 0 or more")
         self._wrench = wrench
         self._step_wrench = step_wrench or wrench
         start_ns = monotonic_ns() if started_ns is None else started_ns
-        self._step_ns = math.inf if step_after_s is None else start_ns + round(step_after_s * NS_PER_S)
+        self._step_ns = start_ns + step_ns
 
     def read_ft(self, t_ns: int) -> Vector6:
         """Return the wrench at `t_ns`."""

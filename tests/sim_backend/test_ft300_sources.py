@@ -106,7 +106,7 @@ def test_half_a_step_is_a_usage_error():
         ConstantWrench(step_after_s=1.0)
     with pytest.raises(UsageError, match="both its time and its wrench"):
         ConstantWrench(step_wrench=(0.0,) * 6)
-    for seconds in (-1.0, float("nan"), float("inf")):
+    for seconds in (-1.0, float("nan"), float("inf"), 1e300):
         with pytest.raises(UsageError, match="cannot be"):
             ConstantWrench(step_after_s=seconds, step_wrench=(0.0,) * 6)
 
