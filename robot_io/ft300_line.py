@@ -19,7 +19,7 @@ import serial
 from serial.tools import list_ports
 
 from robot_io.errors import DeviceUnreachable, UsageError
-from robot_io.ft300_tcp import TcpPort
+from robot_io.ft300_tcp import SCHEME, TcpPort, is_tcp_address
 
 BAUD = 19_200
 ANSWER_TIMEOUT_S = 0.3
@@ -61,9 +61,10 @@ class SerialLine:
 
     def __init__(self, port: str) -> None:
         self.port = port
-        if "://" in port and not port.startswith("socket://"):
+        over_tcp = "://" in port
+        if over_tcp and not is_tcp_address(port):
             raise UsageError(f"{port!r} is no port of an FT 300", do="Give a device path or socket://host:port")
-        make = TcpPort if "://" in port else serial.Serial
+        make = TcpPort if over_tcp else serial.Serial
         try:
             self.serial: _Port = make(
                 port, BAUD, timeout=ANSWER_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True
@@ -196,7 +197,7 @@ def _unreachable(port: str, error: Exception) -> DeviceUnreachable:
     """Say what is wrong with the port, and what to do about it."""
     code = error.errno if isinstance(error, OSError) else None
     where = f"ft300 {port}"
-    if port.startswith("socket://"):
+    if port.startswith(SCHEME):
         return DeviceUnreachable(
             f"nothing accepts the connection ({error})", where=where, do="Start the serial server or check its address"
         )

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import select
 import socket
+from urllib.parse import urlsplit
 
 from serial.urlhandler import protocol_socket
 
 CONNECT_TIMEOUT_S = 2.0
 MOST_READS = 16
+SCHEME = "socket://"
+
+
+def is_tcp_address(port: str) -> bool:
+    """Return whether `port` is `socket://host:port` and nothing more."""
+    try:
+        parts = urlsplit(port)
+        return port.startswith(SCHEME) and bool(parts.hostname and parts.port) and port == f"{SCHEME}{parts.netloc}"
+    except ValueError:  # a port that is no number, or beyond 65535
+        return False
 
 
 class TcpPort(protocol_socket.Serial):

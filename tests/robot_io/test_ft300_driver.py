@@ -212,6 +212,16 @@ def test_a_closed_tcp_port_fails_at_once():
         Ft300(f"socket://127.0.0.1:{port}").open()
 
 
+@pytest.mark.parametrize(
+    "rest", ["", "127.0.0.1", "127.0.0.1:", ":4000", "127.0.0.1:tty", "127.0.0.1:0", "127.0.0.1:99999",
+             "127.0.0.1:4000/tty", "127.0.0.1:4000?logging=debug", "[::1:4000"],
+)  # fmt: skip
+def test_a_tcp_address_that_names_no_port_is_a_usage_error(rest):
+    with pytest.raises(UsageError, match="no port of an FT 300") as caught:
+        Ft300(f"socket://{rest}").open()
+    assert "socket://host:port" in caught.value.do
+
+
 def test_a_silent_port_names_the_power_supply_in_time():
     master, slave = pty.openpty()
     tty.setraw(slave)
