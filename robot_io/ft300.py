@@ -156,6 +156,7 @@ class Ft300(DriverBase):
                 return self._read_registers(self.open())
             finally:
                 self.close()
+        self._opened()
         if self._streaming:
             raise DeviceNotReady("it cannot be polled while it streams", where=self._where, do="Stop it first")
         return self._read_registers(None)

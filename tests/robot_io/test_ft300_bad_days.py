@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from robot_io.errors import DeviceError, DeviceUnreachable
+from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable
 from robot_io.ft300 import Ft300
 from robot_io.messages import LinkState
 from tests.wire.ft300_process import ft300_process, until
@@ -77,6 +77,8 @@ def test_hang_up_is_lost_and_only_a_fresh_open_brings_it_back(tmp_path):
         assert until(lambda: Path(link).exists())
         assert sensor.drain() == ()
         assert sensor.health().state is LinkState.LOST
+        with pytest.raises(DeviceNotReady, match=r"not open .*gone"):
+            sensor.probe()
         sensor.stop()
         sensor.close()
         sensor.close()
