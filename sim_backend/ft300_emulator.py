@@ -69,7 +69,7 @@ class Ft300Emulator:
         self._stop_bytes_seen = 0
         self._modbus_from_ns = 0
         self._stalled_until_ns = 0
-        self._last_rx_ns = 0
+        self._heard_until_ns = 0
         self._packets = 0
         self._counted = dict.fromkeys(
             ("samples", "samples_skipped", "packets_sent", "packets_withheld", "bytes_delivered", "bytes_lost",
@@ -211,10 +211,11 @@ class Ft300Emulator:
     def _on_sent(self) -> None:
         """Hear at once what is still on its way: a real client waited for that before its port was closed."""
         now_ns = monotonic_ns()
+        began_ns = self._to_sensor.next_began_ns()
         data = self._to_sensor.take(self._to_sensor.free_ns)
         self._to_sensor.clear()
-        if data and not self._is_stalled(now_ns):
-            self._hear(data, now_ns)
+        if began_ns is not None and not self._is_stalled(now_ns):
+            self._hear(data, began_ns, now_ns)
 
     def _schedule_hearing(self) -> None:
         if len(self._to_sensor) and "hear" not in self._timers:
@@ -223,15 +224,18 @@ class Ft300Emulator:
 
     def _on_hearing(self, _deadline_ns: int) -> None:
         now_ns = monotonic_ns()
+        began_ns = self._to_sensor.next_began_ns()
         data = self._to_sensor.take(now_ns)
         if self._to_sensor.room >= READ_BYTES:
             self._port.resume()
-        if data and not self._is_stalled(now_ns):
-            self._hear(data, now_ns)
+        if data and began_ns is not None and not self._is_stalled(now_ns):
+            self._hear(data, began_ns, now_ns)
         self._schedule_hearing()
 
-    def _hear(self, data: bytes, now_ns: int) -> None:
-        pause_ns, self._last_rx_ns = now_ns - self._last_rx_ns, now_ns
+    def _hear(self, data: bytes, began_ns: int, now_ns: int) -> None:
+        # Pauses are those of the line: a host that was held up and hears late has not paused.
+        pause_ns = began_ns - self._heard_until_ns
+        self._heard_until_ns = min(self._to_sensor.free_ns, now_ns)
         if self._streaming:
             data = self._look_for_stop(data, now_ns)
         if data and now_ns >= self._modbus_from_ns:

@@ -178,6 +178,40 @@ def test_unknown_registers_are_refused_or_met_with_silence(unknown):
         os.close(fd)
 
 
+def test_a_pause_of_the_host_is_no_pause_on_the_line():
+    loop = EventLoop()
+    emulator = Ft300Emulator(loop, ConstantWrench())
+    emulator.start()
+    fd = open_port(emulator.port)
+    os.write(fd, READ_FIRMWARE)
+    while not len(emulator._to_sensor):
+        loop.run_once(1)
+    while len(emulator._to_sensor) == len(READ_FIRMWARE):
+        loop.run_once(1)
+    time.sleep(0.03)  # the sensor has heard the beginning of the request
+    data = b""
+    deadline_s = time.monotonic() + 3
+    while len(data) < len(FIRMWARE) and time.monotonic() < deadline_s:
+        loop.run_once(5)
+        if select.select([fd], [], [], 0)[0]:
+            data += os.read(fd, 4096)
+    assert data == FIRMWARE
+    os.close(fd)
+    emulator.close()
+    loop.close()
+
+
+def test_a_request_that_was_broken_off_is_forgotten():
+    with ft300_process() as emulator:
+        fd = open_port(emulator.port)
+        # Begins a write of 30 words; the read behind it would be taken for their values.
+        os.write(fd, bytes.fromhex("09 10 01 9A 00 1E 3C"))
+        time.sleep(0.05)
+        os.write(fd, READ_FIRMWARE)
+        assert read_for(fd, 7) == FIRMWARE
+        os.close(fd)
+
+
 def test_a_port_whose_speed_nobody_set_gives_garbage():
     with ft300_process(streaming=True) as emulator:
         fd = open_port(emulator.port, set_speed=False)
