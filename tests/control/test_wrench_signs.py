@@ -24,6 +24,8 @@ from control.step import step
 from robot_io.config import RigConfig
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, FtReading, TickInput
+from sim_backend.contact_outcome import ContactMode, ContactOutcome
+from sim_backend.world import World
 from tests.mutants import sign_mutants
 from tools.rig import resolve_rig
 
@@ -165,6 +167,19 @@ def test_the_simulated_sensor_reads_the_hand_numbers(name):
 
 def test_the_simulated_sensor_adds_bias_and_tool_weight():
     assert world_side_is_right()
+
+
+def test_the_world_gives_the_sensor_the_place_of_the_contact_as_the_turned_robot_sees_it():
+    """The case "lever" with the robot turned left: ahead is world +y, left is world -x."""
+    force, _, contact, origin, raw = CASES["lever"]
+    rig = rig_with(origin)
+    world = World(replace(rig, path=replace(rig.path, direction_deg=90.0)), 0, 0)
+    base = world.read_base(0).pose
+    assert base.yaw == pytest.approx(QUARTER)
+    world._contact = ContactOutcome(
+        ContactMode.STICKING, -force[1], force[0], contact_x=base.x - contact[1], contact_y=base.y + contact[0]
+    )
+    assert world.read_ft(0) == pytest.approx(raw, abs=2e-6)
 
 
 @pytest.mark.parametrize("name", CASES)
