@@ -12,17 +12,22 @@ measures the reaction on the tool: minus the force on the object.
 from __future__ import annotations
 
 import math
+import struct
 from itertools import combinations
 
+import libscrc
 import pytest
 from msgspec.structs import replace
 
 import control.wrench
 import sim_backend.sensor_model
+from control.loop import ft_input
 from control.settings import Settings
 from control.step import step
 from robot_io.config import RigConfig
-from robot_io.messages import Pose2D
+from robot_io.ft300 import Ft300
+from robot_io.ft300_codec import StreamParser, wrench_from_counts
+from robot_io.messages import Pose2D, Stamped
 from robot_io.tick import ControlState, FtReading, TickInput
 from sim_backend.contact_outcome import ContactMode, ContactOutcome
 from sim_backend.world import World
@@ -205,6 +210,23 @@ def test_the_whole_step_finds_the_force_and_rotates_by_the_measured_yaw(name):
     after, _ = step(settings, state, inp)
     assert after.force_valid
     assert after.force_world == pytest.approx((*force, 0.0), abs=5e-6)
+
+
+def test_from_the_bytes_of_the_sensor_to_the_force_no_axis_changes_place():
+    """The case "lateral" (six different numbers) as a packet: through codec, loop and step to (15, 10)."""
+    raw = tuple(r + b for r, b in zip(CASES["lateral"][4], BIAS, strict=True))
+    body = b"\x20\x4e" + struct.pack("<3h", *(round(100 * r) for r in raw[:3]))
+    body += struct.pack("<3h", *(round(1000 * r) for r in raw[3:]))
+    (counts,) = StreamParser().feed(body + struct.pack("<H", libscrc.modbus(body)))
+    given = ft_input([Stamped(wrench_from_counts(counts), 1, 2)], Ft300("/dev/none").health())
+    (reading,) = given.readings
+    assert (*reading.force, *reading.torque) == pytest.approx(raw, abs=0.0051)
+    assert reading.torque == pytest.approx(raw[3:], abs=0.00051)
+    rig = rig_with((0.85, 0.0, 0.15))
+    settings = Settings.of(replace(rig, control=replace(rig.control, force_filter_tau_s=0.0)))
+    state = ControlState(phase=2, tared=True, bias_force=BIAS[:3], bias_torque=BIAS[3:], last_reading_ns=1)
+    after, _ = step(settings, state, good_input(reading, 0.0))
+    assert after.force_world == pytest.approx((15.0, 10.0, 0.0), abs=0.011)
 
 
 def good_input(reading: FtReading, yaw: float) -> TickInput:
