@@ -71,7 +71,7 @@ class Ft300(DriverBase):
     def open(self) -> DeviceInfo:
         """Open the port, stop a stream left running, identify the sensor.
 
-        Takes 0.2 s, 0.5 s when it streamed, 1.2 s when nothing answers, 4 s at most. Raises DeviceUnreachable
+        Takes 0.2 s, 0.5 s when it streamed, 1.2 s when nothing answers, 5 s at most. Raises DeviceUnreachable
         (port missing, busy or forbidden; no answer), DeviceProtocolError (another device) or UsageError (no port).
         """
         self.close()

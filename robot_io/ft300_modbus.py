@@ -28,9 +28,8 @@ REG_WRENCH, REG_ACCELERATION, REG_OUTPUT, REG_FIRMWARE, REG_SERIAL, REG_YEAR = 1
 START_STREAM = 0x0200
 COUNTS_PER_G = 1000.0
 
-IDENTIFY_ATTEMPTS = 2
-QUIET_LIMIT_S = 3.0
-"""Limit for stopping a stream found at open; Robotiq's manual says half a second of 0xFF."""
+QUIET_LIMITS_S = (3.0, 1.0)
+"""Limit of each try for stopping a stream found at open; Robotiq's manual says half a second of 0xFF."""
 MODE_CHANGE_S = 0.1
 """Time the sensor needs to change from stream to Modbus (Robotiq's driver waits as long)."""
 
@@ -52,9 +51,9 @@ class Ft300Registers:
         DeviceUnreachable (no answer) or DeviceProtocolError (not an FT 300).
         """
         failure: Exception | None = None
-        for _ in range(IDENTIFY_ATTEMPTS):
+        for quiet_limit_s in QUIET_LIMITS_S:
             if not self._line.is_silent() or isinstance(failure, minimalmodbus.NoResponseError):
-                self._stop_stream()
+                self._stop_stream(quiet_limit_s)
             try:
                 firmware = self._read(REG_FIRMWARE, 3)
             except minimalmodbus.ModbusException as error:
@@ -91,8 +90,8 @@ class Ft300Registers:
         with contextlib.suppress(minimalmodbus.ModbusException):
             self._instrument.write_register(REG_OUTPUT, START_STREAM, functioncode=WRITE_MULTIPLE)
 
-    def _stop_stream(self) -> None:
-        if not self._line.make_quiet(QUIET_LIMIT_S):
+    def _stop_stream(self, limit_s: float) -> None:
+        if not self._line.make_quiet(limit_s):
             raise DeviceProtocolError(
                 "it keeps sending and does not stop when asked",
                 where=self._where,

@@ -245,6 +245,34 @@ def test_a_device_that_never_stops_talking_is_named():
         assert time.monotonic() - started_s < 5
 
 
+@pytest.mark.long
+def test_a_device_that_falls_silent_only_to_talk_again_ends_the_opening_in_time():
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    done = threading.Event()
+
+    def talk():
+        started_s = time.monotonic()
+        while not done.wait(0.01):
+            if (time.monotonic() - started_s) % 3.1 < 2.85:
+                os.write(master, b"READY\r\n")
+            if select.select([master], [], [], 0)[0]:
+                os.read(master, 4096)
+
+    thread = threading.Thread(target=talk)
+    thread.start()
+    started_s = time.monotonic()
+    try:
+        with pytest.raises(DeviceProtocolError):
+            Ft300(os.ttyname(slave)).open()
+        assert time.monotonic() - started_s < 5  # promised by open
+    finally:
+        done.set()
+        thread.join()
+        os.close(master)
+        os.close(slave)
+
+
 def test_another_firmware_is_another_device():
     with ft300_process(firmware="GRP-1.2.3") as emulator:
         with pytest.raises(DeviceProtocolError, match="firmware is 'GRP"):
