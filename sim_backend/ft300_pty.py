@@ -52,12 +52,19 @@ class PtyPort:
         self.attaches = 0
 
     def open(self) -> None:
-        """Create the pty and its link. Raises EnvironmentFault when something else is at the link's place."""
+        """Create the pty and its link. Raises EnvironmentFault: no pty to be had, or something at the link's place."""
         if self._link is not None and self._link.exists() and not self._link.is_symlink():
             raise EnvironmentFault(
                 "something that is no link is in the way", where=str(self._link), do="Choose another name"
             )
-        self._master, slave = os.openpty()
+        try:
+            self._master, slave = os.openpty()
+        except OSError as error:
+            raise EnvironmentFault(
+                f"this machine gives no pseudo-terminal ({error})",
+                where="/dev/pts",
+                do="Mount devpts there, or close some terminals",
+            ) from error
         # Before a byte is sent: a cooked line would echo the stream to its sender and change 0x0D to 0x0A.
         tty.setraw(slave)
         attributes = termios.tcgetattr(slave)

@@ -298,6 +298,18 @@ def test_link_replaces_a_stale_link_but_nothing_else(tmp_path):
     loop.close()
 
 
+def test_a_machine_without_ptys_is_named(monkeypatch):
+    def none_left():
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "openpty", none_left)
+    loop = EventLoop()
+    with pytest.raises(EnvironmentFault, match=r"no pseudo-terminal .*No space left") as caught:
+        Ft300Emulator(loop, ConstantWrench()).start()
+    assert "devpts" in caught.value.do
+    loop.close()
+
+
 def test_a_cooked_client_is_its_own_fault_but_a_fresh_port_is_raw():
     with ft300_process() as emulator:
         fd = open_port(emulator.port)
