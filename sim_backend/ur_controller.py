@@ -74,10 +74,7 @@ class UrController:
             self.robot_mode = self._power_at[1]
             self._power_at = None
         if self._waiting is not None and now_ns >= self._waiting[0]:
-            self.program = self._waiting[1]
-            self._waiting = None
-            self.runtime_state = RuntimeState.PLAYING
-            self.counters["programs_started"] += 1
+            self._begin_program(self._waiting[1])
         if self.watchdog is not None and self.watchdog.tripped(now_ns):
             self.counters["watchdog_trips"] += 1
             self.stop_program()
@@ -102,6 +99,15 @@ class UrController:
         """Stop what runs and start `program` a moment later."""
         self.stop_program()
         self._waiting = (self._now_ns + PROGRAM_START_NS, program)
+
+    def _begin_program(self, program: Program) -> None:
+        self._waiting = None
+        if not self.ready:  # it was when the program came
+            self.counters["scripts_refused"] += 1
+            return
+        self.program = program
+        self.runtime_state = RuntimeState.PLAYING
+        self.counters["programs_started"] += 1
 
     def play_other_program(self, name: str = "other") -> None:
         """Run a program that is not ours, as from the pendant."""

@@ -14,6 +14,8 @@ from sim_backend.plant import ArmTruth
 
 SERVO_LAG_S = 0.03
 STEADY_RAD_PER_S = 0.001
+JOINT_RANGE_RAD = 2.0 * math.pi
+"""Either way, as on the real arm."""
 
 
 class ArmMotion:
@@ -42,6 +44,7 @@ class ArmMotion:
 
     def servo(self, target: Joints) -> None:
         """Follow `target` until told otherwise."""
+        target = _joints([_in_range(q) for q in target])
 
         def follow(base: Joints, dt_s: float) -> Sequence[float]:
             share = 1.0 - math.exp(-dt_s / SERVO_LAG_S)
@@ -57,11 +60,12 @@ class ArmMotion:
 
     def move(self, target: Joints, speed_rad_per_s: float) -> None:
         """Go to `target` with the leading joint at `speed_rad_per_s`; `moving` until arrived."""
+        target = _joints([_in_range(q) for q in target])
 
         def straight(base: Joints, dt_s: float) -> Sequence[float]:
             left = [target[i] - base[i] - self.offset[i] for i in range(6)]
             longest = max(abs(x) for x in left)
-            step = max(speed_rad_per_s, 0.01) * dt_s
+            step = max(0.01, speed_rad_per_s) * dt_s  # 0.01 for NaN as well
             if longest <= step:
                 self.hold()
                 return left
@@ -76,10 +80,18 @@ class ArmMotion:
         rates = []
         for i in range(6):
             change = commanded[i] + self.drift_rate[i] * dt_s
+            wanted = base.position[i] + self.offset[i] + change
+            if (reached := _in_range(wanted)) != wanted:
+                change = reached - base.position[i] - self.offset[i]
             self.offset[i] += change
             rates.append(base.velocity[i] + change / dt_s)
         self.velocity = _joints(rates)
         self.actual = self.target = _joints([base.position[i] + self.offset[i] for i in range(6)])
+
+
+def _in_range(q: float) -> float:
+    """Return `q` (rad), or the end of the joint's range when it lies beyond; clients command infinity and NaN too."""
+    return q if abs(q) <= JOINT_RANGE_RAD else math.copysign(JOINT_RANGE_RAD, q)
 
 
 def _joints(values: Sequence[float]) -> Joints:

@@ -16,7 +16,7 @@ from sim_backend.ur_motion import ArmMotion
 from sim_backend.ur_registers import Registers, Watchdog
 
 CONTROL_SCRIPT_MARK = "RTDE Control Script"
-_OFFSET = re.compile(r"# float register offset\s*\n\s*(\d+)")
+_OFFSET = re.compile(r"# float register offset\s*\n\s*(0|24)\b")
 
 READY = 1
 DONE = 2

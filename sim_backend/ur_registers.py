@@ -33,7 +33,7 @@ class Watchdog:
     def __init__(self, registers: Registers, index: int, min_frequency_hz: float, now_ns: int) -> None:
         self._registers = registers
         self._index = index
-        self._limit_ns = int(NS_PER_S / min_frequency_hz)
+        self._limit_ns = NS_PER_S / min_frequency_hz  # infinite for a rate too small to divide by
         self._since_ns = now_ns
 
     def tripped(self, now_ns: int) -> bool:

@@ -32,7 +32,7 @@ class ScriptClient(TcpClient):
         """See `TcpClient.on_bytes`."""
         self._seen.script_bytes += len(data)
         *lines, self._rest = (self._rest + data).split(b"\n")
-        if len(self._rest) > _LIMIT_BYTES or sum(map(len, self._program)) > _LIMIT_BYTES:
+        if len(self._rest) > _LIMIT_BYTES or sum(map(len, self._program)) + len(self._program) > _LIMIT_BYTES:
             self.close()
             return
         for line in lines:

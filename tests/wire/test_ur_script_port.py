@@ -1,5 +1,6 @@
 """Script upload and ur_rtde's register protocol, driven with plain sockets."""
 
+import math
 import socket
 import struct
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 from tests.ur_emulator_process import EmulatorProcess, wait_until
 
 PLAYING, STOPPED, PAUSED = 2, 1, 4
-SERVO_J, SERVO_STOP, IS_STEADY, SET_WATCHDOG, STOP_SCRIPT = 11, 16, 47, 35, 255
+MOVE_J, SPEED_J, SERVO_J, SERVO_STOP, IS_STEADY, SET_WATCHDOG, STOP_SCRIPT = 1, 9, 11, 16, 47, 35, 255
 
 
 def control_script(offset: int) -> str:
@@ -101,6 +102,25 @@ def test_programs_are_refused_without_a_word(robot, fault) -> None:
     assert runtime(robot) == STOPPED
 
 
+def test_a_stop_before_the_start_refuses_the_program(robot) -> None:
+    """The controller takes a moment between upload and start."""
+    with socket.create_connection((robot.host, 30003), timeout=3) as connection:
+        connection.sendall(b"def first():\n  sync()\nend\n")
+        wait_until(lambda: robot.get("controller._waiting") is not None, "it is about to start")
+        robot.call("protective_stop")
+    wait_until(lambda: robot.get("counters.scripts_refused") == 1, "it is refused")
+    robot.call("clear_stop")
+    wait_cycles(robot, 10)
+    assert runtime(robot) == STOPPED
+    assert robot.get("counters.programs_started") == 0
+
+
+@pytest.mark.parametrize("offset", [1, 47, 1000])
+def test_a_register_offset_that_no_script_has_is_taken_as_none(robot, offset: int) -> None:
+    upload(robot.host, control_script(offset))
+    wait_until(lambda: robot.get("controller.registers.int_out")[0] == 1, "ready on the lower registers")
+
+
 class Registers:
     """Writes commands and reads answers of the control script over RTDE."""
 
@@ -162,6 +182,27 @@ def test_servo_target_is_followed_and_held_without_further_commands(robot, regis
     robot.call("drift_step", [0.005] * 6)
     wait_cycles(robot, 30)
     assert robot.get("controller.motion.actual") == pytest.approx([q + 0.005 for q in target], abs=2e-4)
+
+
+@pytest.mark.parametrize("number", [MOVE_J, SPEED_J, SERVO_J])
+@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e308, -1e308])
+def test_a_joint_stays_within_its_range_whatever_is_commanded(robot, number: int, value: float) -> None:
+    upload(robot.host, control_script(0))
+    wait_until(lambda: runtime(robot) == PLAYING, "the control script plays")
+    registers = Registers(robot.host, 0)
+    registers.command(number, value, 0.0)
+    wait_cycles(robot, 5)
+    registers.command(0)
+    assert all(abs(q) <= 2 * math.pi for q in robot.get("controller.motion.actual"))
+    assert runtime(robot) == PLAYING
+    registers.close()
+
+
+def test_a_watchdog_slower_than_any_number_never_trips(robot, registers) -> None:
+    registers.command(SET_WATCHDOG, 1e-300)
+    wait_until(lambda: script_state(robot, registers) == 2, "the watchdog is set")
+    wait_cycles(robot, 20)
+    assert robot.get("counters.watchdog_trips") == 0
 
 
 def test_stop_script_ends_the_program(robot, registers) -> None:
