@@ -11,7 +11,8 @@ from collections.abc import Callable
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.event_loop import HANGUP, READ, WRITE, EventLoop
 
-_READ_BYTES = 65536
+_READ_BYTES = 4096
+"""Little at a time: a client that floods its connection with requests must not keep the others waiting."""
 _QUEUE_LIMIT_BYTES = 4_000_000
 """A client that leaves this much unread is dropped."""
 

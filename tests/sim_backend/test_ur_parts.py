@@ -1,6 +1,7 @@
 """The parts of the emulated arm that need no socket, and what it says when its ports are not free."""
 
 import math
+import socket
 
 import pytest
 
@@ -95,14 +96,25 @@ def test_a_taken_address_is_one_sentence() -> None:
 
 
 def test_a_half_taken_address_leaves_nothing_open() -> None:
-    import socket
-
     host = fresh_address()
     loop = EventLoop()
     with socket.create_server((host, 30003)), pytest.raises(EnvironmentFault) as caught:
         UrEmulator(loop, StillArm(), host=host)
     assert caught.value.where == f"{host}:30003"
     UrEmulator(loop, StillArm(), host=host).close()
+    loop.close()
+
+
+def test_a_flood_of_requests_is_taken_a_little_at_a_time() -> None:
+    """Between two helpings the cycle and the other clients have their turn."""
+    loop = EventLoop()
+    emulator = UrEmulator(loop, StillArm(), host=fresh_address())
+    with socket.create_connection((emulator.host, 30004)) as client:
+        client.sendall(b"\x00\x03v" * 20_000)
+        while not emulator.seen.handshake:
+            loop.run_once(1000)
+        assert len(emulator.seen.handshake) < 1500
+    emulator.close()
     loop.close()
 
 
