@@ -78,7 +78,7 @@ class ArmReader:
         """Take a packet when there is a new one; `error` says what is wrong with the link or the packet."""
         rtde = self._rtde
         stamp_s = rtde.getTimestamp()
-        if self.joints is not None and stamp_s == self.joints.controller_time_s:
+        if self.joints is not None and _same(stamp_s, self.joints.controller_time_s):
             if not rtde.isConnected():
                 self.error = ArmError.LINK_LOST
             return False
@@ -109,11 +109,16 @@ class ArmReader:
                 rtde.getRuntimeState(),
             )
             scaling = rtde.getSpeedScaling()
-            if rtde.getTimestamp() == stamp_s:
+            if _same(rtde.getTimestamp(), stamp_s):
                 break
         if len(q) != 6 or len(qd) != 6 or len(modes) != 6:
             return None, self.joint_modes
         return JointState(tuple(q), tuple(qd), *numbers, scaling, stamp_s), tuple(modes)
+
+
+def _same(a_s: float, b_s: float) -> bool:
+    """Whether two time stamps are equal, NaN to NaN as well: a stamp that stays NaN must not look like news."""
+    return a_s == b_s or (math.isnan(a_s) and math.isnan(b_s))
 
 
 POLL_NS = 2 * NS_PER_MS

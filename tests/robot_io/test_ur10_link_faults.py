@@ -119,6 +119,15 @@ def test_time_jumping_forward_is_passed_on(robot, arm) -> None:
     assert arm.read().error == ArmError.NONE
 
 
+def test_a_time_stamp_that_is_not_a_number_is_no_news(robot, arm) -> None:
+    """NaN differs from NaN: data that stand still, or a link that is gone, would look fresh for ever."""
+    robot.call("jump_time", math.nan)
+    wait_until(lambda: arm.read().error == ArmError.NOT_FINITE, "marked")
+    wait_until(lambda: data_age_ms(arm) > 300, "the data grow old")
+    robot.call("close_clients")
+    wait_until(lambda: arm.read().link == LinkState.LOST, "the loss is seen")
+
+
 def test_dropped_packets_do_not_matter(robot, arm) -> None:
     packets = arm.read().packets
     robot.call("drop_data", 5)
