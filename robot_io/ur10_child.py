@@ -55,25 +55,37 @@ RECEIVER_PRIORITY = 60
 Below every priority of this program, because that thread is not ours."""
 
 
+class Ending:
+    """Takes SIGTERM from now on, for the loop to act on: a control script that has begun must be ended, not left."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        signal.signal(signal.SIGTERM, self._on_sigterm)
+
+    def _on_sigterm(self, _signal: int, _frame: object) -> None:
+        self.asked = True
+
+
 class ArmProcess:
     """The loop: look for a packet, publish, and in servo mode command the target."""
 
-    def __init__(self, job: ArmJob, record: SharedRecord, reader: ArmReader, hold: ActiveHold | None) -> None:
+    def __init__(
+        self, job: ArmJob, record: SharedRecord, reader: ArmReader, hold: ActiveHold | None, ending: Ending
+    ) -> None:
         self._job = job
         self._record = record
         self._reader = reader
         self._hold = hold
+        self._ending = ending
         self._pid = os.getpid()
-        self._stop = False
         self._published_ns = 0
         self._publish(monotonic_ns(), LinkState.UP, reader.error)
 
     def run(self) -> None:
         """Publish until SIGTERM; then end cleanly. Raises DeviceError when the link or the holding is lost."""
-        signal.signal(signal.SIGTERM, self._on_sigterm)
         deadline_ns = monotonic_ns()
         command_ns = deadline_ns
-        while not self._stop:
+        while not self._ending.asked:
             now_ns = monotonic_ns()
             fresh = self._reader.poll(now_ns)
             error = self._reader.error
@@ -108,9 +120,6 @@ class ArmProcess:
         )
         self._record.publish(pack_arm_record(record))
 
-    def _on_sigterm(self, _signal: int, _frame: object) -> None:
-        self._stop = True
-
 
 def _sleep_until_next(deadline_ns: int) -> int:
     """Sleep to the next absolute deadline, skipping the ones already missed; return it."""
@@ -122,13 +131,14 @@ def _sleep_until_next(deadline_ns: int) -> int:
     return deadline_ns
 
 
-def hold_arm(job: ArmJob, record: SharedRecord) -> None:
-    """Connect, report ready, publish until told to end. Raises DeviceError."""
+def hold_arm(job: ArmJob, record: SharedRecord) -> NoReturn:
+    """Connect, report ready, publish until told to end; then end this process. Raises DeviceError."""
     info = preflight(job.host)
     threads_priority = RECEIVER_PRIORITY if job.realtime_priority > 0 else 0
     with starting_threads_at(threads_priority):
         reader = ArmReader(job.host)
     reader.wait_flowing()
+    ending = Ending()  # before this, SIGTERM ends the process at once, in a wheel that hangs as well
     hold = None
     if job.hold == "servo":
         with starting_threads_at(threads_priority):
@@ -140,9 +150,15 @@ def hold_arm(job: ArmJob, record: SharedRecord) -> None:
     realtime = job.realtime_priority > 0 and try_realtime(job.realtime_priority)
     if hold is not None:
         hold.begin()  # from here on its watchdog waits 0.1 s at most: the slow preparations are done
-    process = ArmProcess(job, record, reader, hold)  # publishes the first record
+    process = ArmProcess(job, record, reader, hold, ending)  # publishes the first record
     _report(job, ready_line(info, realtime))
     process.run()
+    _leave(0)
+
+
+def _leave(code: int) -> NoReturn:
+    """End while the wheel's objects still live: their destructors sleep, and have been seen to crash."""
+    os._exit(code)  # the kernel closes everything
 
 
 def _report(job: ArmJob, line: bytes) -> None:
@@ -157,16 +173,16 @@ def main() -> NoReturn:
     die_with_parent(job.parent_pid)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the launcher's to handle
     set_timer_slack_1ns()
-    code = 0
     try:
         hold_arm(job, SharedRecord(job.record_fd, ARM_RECORD_BYTES))
     except PushError as error:
         _report(job, error_line(error))
-        code = error.exit_code
+        _leave(
+            error.exit_code
+        )  # in here: after this block the error lets go of the frames that hold the wheel's objects
     except Exception as error:  # the last line of a process: whatever it was, the parent hears of it
         _report(job, error_line(DeviceError(f"the arm's process failed: {error!r}", where=job.host)))
-        code = 1
-    os._exit(code)  # the wheel's destructors sleep, and have been seen to crash; the kernel closes everything
+        _leave(1)
 
 
 if __name__ == "__main__":

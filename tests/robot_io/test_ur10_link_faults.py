@@ -164,3 +164,32 @@ def test_drift_reaches_the_record_and_is_not_corrected(robot, arm) -> None:
     robot.call("drift_rate", [0.0] * 6)
     wait_until(lambda: arm.read().joints.velocity[0] == 0.0, "at rest")
     assert arm.read().joints.position[0] > 1.5758
+
+
+WHEEL_WITH_A_DESTRUCTOR = """
+import os, time
+class RTDEReceiveInterface:
+    def __init__(self, *_): self.began_s = time.monotonic()
+    def __del__(self): os.mkdir(os.environ["DESTROYED"])  # no file: that would need a descriptor
+    def getTimestamp(self): return min(time.monotonic() - self.began_s, float(os.environ["LASTS_S"]))
+    def isConnected(self): return self.getTimestamp() < float(os.environ["LASTS_S"])
+    def getActualQ(self): return [0.0] * 6
+    getActualQd = getActualQ
+    def getRobotMode(self): return 1
+    getSafetyMode = getSafetyStatusBits = getRobotStatus = getRuntimeState = getSpeedScaling = getRobotMode
+    def getJointMode(self): return [253] * 6
+"""
+
+
+@pytest.mark.parametrize("lasts_s", [0.3, 1e9])
+def test_no_destructor_of_the_wheel_runs(robot, tmp_path, monkeypatch, lasts_s: float) -> None:
+    """They sleep 0.5 s each, and crash on a dead link: neither a lost link nor a clean end may run them."""
+    (tmp_path / "rtde_receive.py").write_text(WHEEL_WITH_A_DESTRUCTOR)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("DESTROYED", str(tmp_path / "destroyed"))
+    monkeypatch.setenv("LASTS_S", str(lasts_s))
+    with Ur10(robot.host) as arm:
+        if lasts_s < 1:
+            wait_until(lambda: arm.read().link == LinkState.LOST, "the record says lost")
+            wait_until(lambda: "link_lost" in arm.health().cause, "and why")
+    assert not (tmp_path / "destroyed").exists()

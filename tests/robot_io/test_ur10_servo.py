@@ -6,10 +6,11 @@ import time
 
 import pytest
 
-from robot_io.arm_record import ArmError
+from robot_io.arm_record import ARM_RECORD_BYTES, ArmError
 from robot_io.errors import DeviceNotReady
 from robot_io.messages import LinkState
-from robot_io.ur10 import Ur10
+from robot_io.shared_record import SharedRecord
+from robot_io.ur10 import Ur10, end_child, spawn_child
 from tests.ur_emulator_process import EmulatorProcess, wait_until
 
 HELD = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31)
@@ -83,6 +84,22 @@ def test_the_watchdog_does_not_wait_for_slow_preparations(robot, tmp_path, monke
         packets = arm.read().packets
         wait_until(lambda: arm.read().packets > packets + 30, "for a while")
         assert arm.read().servo
+    assert robot.get("counters.watchdog_trips") == 0
+
+
+def test_told_to_end_while_it_begins_it_ends_its_script(robot, tmp_path, monkeypatch) -> None:
+    """No watchdog is armed yet: a script left behind would play until somebody stops it at the pendant."""
+    (tmp_path / "sitecustomize.py").write_text(SLOW_PREPARATION)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    record = SharedRecord.create("arm", ARM_RECORD_BYTES)
+    child = spawn_child(robot.host, hold="servo", record_fd=record.fd)
+    try:
+        wait_until(lambda: robot.get("controller.runtime_state") == 2, "the script plays")
+    finally:
+        code = end_child(child)
+        record.close()
+    assert code == 0
+    wait_until(lambda: robot.get("controller.runtime_state") == 1, "the script has ended")
     assert robot.get("counters.watchdog_trips") == 0
 
 
