@@ -47,8 +47,8 @@ def spawn_child(
     """Start the arm's process for the robot at `host`; it publishes into `record_fd` (a `SharedRecord`).
 
     Angles in rad. It reports on `status_fd` (the write end of a pipe; close yours after this call) with lines
-    for `arm_job.parse_status`, dies with the calling process, and ends on SIGTERM. `stderr` takes the wheel's
-    own messages. Nothing here waits: enforce a deadline for the first status line.
+    for `arm_job.parse_status`, dies with the calling thread (prctl(2) PR_SET_PDEATHSIG), and ends on SIGTERM.
+    `stderr` takes the wheel's own messages. Nothing here waits: enforce a deadline for the first status line.
     """
     job = ArmJob(host, hold, record_fd, os.getpid(), held_pose_rad, held_pose_tolerance_rad, status_fd)
     command, environment = fresh_interpreter("robot_io.ur10_child")
@@ -130,7 +130,10 @@ class Ur10(DriverBase):
         self._exit_code: int | None = None
 
     def open(self) -> DeviceInfo:
-        """Start the arm's process and wait until it has published (5 s, servo 8 s). Raises DeviceError."""
+        """Start the arm's process and wait until it has published (5 s, servo 8 s). Raises DeviceError.
+
+        That process dies with the thread that calls this: open the arm in one that lives as long as you need it.
+        """
         if self._child is not None:
             raise DeviceError("the arm is already open", where=self.host)
         record = SharedRecord.create("arm", ARM_RECORD_BYTES)

@@ -117,7 +117,7 @@ class _Connection:
         try:
             self._socket = socket.create_connection((host, port), timeout=self._left_s())
         except TimeoutError as error:
-            raise self._silent("no answer to the connection") from error
+            raise DeviceUnreachable("no answer to the connection", where=self.where, do=_ADVICE_CABLE) from error
         except (OSError, UnicodeError) as error:
             raise DeviceUnreachable(f"cannot connect ({_reason(error)})", where=self.where, do=_ADVICE_CABLE) from error
 

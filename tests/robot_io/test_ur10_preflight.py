@@ -1,5 +1,6 @@
 """The plain-socket look at the controller: every refusal is quick, typed and says what to do."""
 
+import contextlib
 import socket
 import threading
 import time
@@ -45,6 +46,22 @@ def test_nothing_that_could_move_the_arm_is_sent(robot) -> None:
 
 def test_closed_port() -> None:
     assert "Connection refused" in refused(fresh_address(), DeviceUnreachable)
+
+
+def test_an_address_that_does_not_answer_at_all() -> None:
+    """As with the power off or the cable out; here the kernel drops what exceeds the queue of connections."""
+    host = fresh_address()
+    with contextlib.ExitStack() as stack:
+        listener = stack.enter_context(socket.socket())
+        listener.bind((host, 30004))
+        listener.listen(0)
+        for _ in range(3):
+            waiting = stack.enter_context(socket.socket())
+            waiting.setblocking(False)
+            waiting.connect_ex((host, 30004))
+        message = refused(host, DeviceUnreachable)
+    assert "no answer" in message
+    assert "cable" in message
 
 
 @pytest.mark.parametrize("version", [(3, 14, 3, 1), (5, 11, 0, 108249), (3, 2, 0, 0), (4, 15, 0, 0)])
