@@ -22,6 +22,9 @@ RUNTIME_STOPPED = 1
 """UR RTDE guide: runtime_state."""
 JOINT_MODE_RUNNING = 253
 NORMAL_OR_REDUCED = 0b11
+SAFETY_NORMAL, SAFETY_REDUCED = 1, 2
+SAFETY_EMERGENCY = (6, 7)
+"""UR RTDE guide: safety_mode, which says the same as the bits and is believed as well."""
 PROTECTIVE_STOP, SAFEGUARD_STOP = 1 << 2, 1 << 4
 EMERGENCY = (1 << 5) | (1 << 6) | (1 << 7)
 ANY_STOP = 0b11111111100
@@ -69,9 +72,9 @@ def check(
 def _of_modes(settings: SafetySettings, inp: TickInput) -> list[str]:
     joints = inp.arm.joints
     bits = joints.safety_bits
-    if bits & EMERGENCY:
+    if bits & EMERGENCY or joints.safety_mode in SAFETY_EMERGENCY:
         return ["F23"]
-    if bits & ANY_STOP or not bits & NORMAL_OR_REDUCED:
+    if bits & ANY_STOP or not bits & NORMAL_OR_REDUCED or joints.safety_mode not in (SAFETY_NORMAL, SAFETY_REDUCED):
         return ["F22"]
     status = joints.robot_status_bits
     running = joints.robot_mode == ROBOT_MODE_RUNNING and status & POWER_ON and not status & TEACH_BUTTON

@@ -213,6 +213,8 @@ SCENARIOS = [
     *(Scenario("F22", f"safety bit {bit}", joints(safety_bits=1 | 1 << bit)) for bit in (2, 3, 4, 8, 9, 10)),
     Scenario("F22", "neither normal nor reduced", joints(safety_bits=0)),
     *(Scenario("F23", f"safety bit {bit}", joints(safety_bits=1 | 1 << bit)) for bit in (5, 6, 7)),
+    *(Scenario("F22", f"safety mode {mode}", joints(safety_mode=mode)) for mode in (0, 3, 4, 5, 8, 9, 53)),
+    *(Scenario("F23", f"safety mode {mode}", joints(safety_mode=mode)) for mode in (6, 7)),
     Scenario("F24-hold", "no record", old("arm", "published_ns", "changed_ns")),
     Scenario("F24-stop", "no record", old("arm", "published_ns", "changed_ns")),
     Scenario("F24-stop", "link lost", arm(link=3)),

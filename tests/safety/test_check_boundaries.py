@@ -161,7 +161,9 @@ def test_age_of_the_arm(key, rows):
 
 
 def test_modes_of_the_arm():
-    assert arm(safety_bits=0b10) == []  # reduced is fine
+    assert arm(safety_bits=0b10, safety_mode=2) == []  # reduced is fine
+    for mode in range(-1, 11):
+        assert arm(safety_mode=mode) == ([] if mode in (1, 2) else ["F23"] if mode in (6, 7) else ["F22"])
     assert arm(robot_status_bits=0b11) == []  # power on, program running bit
     for mode in range(-1, 9):
         assert arm(robot_mode=mode) == ([] if mode == 7 else ["F27"])
