@@ -146,8 +146,6 @@ _OUTPUTS: dict[str, Output] = {
     "payload_inertia": _zeros("VECTOR6D"),
     "output_bit_registers0_to_31": _constant("UINT32", 0),
     "output_bit_registers32_to_63": _constant("UINT32", 0),
-    "input_bit_registers0_to_31": _constant("UINT32", 0),
-    "input_bit_registers32_to_63": _constant("UINT32", 0),
 }
 
 
@@ -173,8 +171,6 @@ _INPUTS: dict[str, Input] = {
     "standard_analog_output_type": Input("UINT8", _discard),
     "standard_analog_output_0": Input("DOUBLE", _discard),
     "standard_analog_output_1": Input("DOUBLE", _discard),
-    "input_bit_registers0_to_31": Input("UINT32", _discard),
-    "input_bit_registers32_to_63": Input("UINT32", _discard),
     "external_force_torque": Input("VECTOR6D", _set_wrench),
 }
 
@@ -194,9 +190,23 @@ def _add_registers(i: int) -> None:
     _INPUTS[f"input_double_register_{i}"] = Input("DOUBLE", write_double)
 
 
+def _add_bits(name: str, type_name: str, first: int, count: int) -> None:
+    """Input bits first..first+count-1 as one number."""
+
+    def write(robot: UrController, values: Values, _now_ns: int) -> None:
+        robot.registers.bits_in[first : first + count] = [bool(int(values[0]) >> i & 1) for i in range(count)]
+
+    def read(robot: UrController) -> Values:
+        return (sum(bit << i for i, bit in enumerate(robot.registers.bits_in[first : first + count])),)
+
+    _OUTPUTS[name] = Output(type_name, read)
+    _INPUTS[name] = Input(type_name, write)
+
+
+_add_bits("input_bit_registers0_to_31", "UINT32", 0, 32)
+_add_bits("input_bit_registers32_to_63", "UINT32", 32, 32)
 for _index in range(REGISTERS):
     _add_registers(_index)
 for _index in range(64, 128):
     _OUTPUTS[f"output_bit_register_{_index}"] = _constant("BOOL", False)
-    _OUTPUTS[f"input_bit_register_{_index}"] = _constant("BOOL", False)
-    _INPUTS[f"input_bit_register_{_index}"] = Input("BOOL", _discard)
+    _add_bits(f"input_bit_register_{_index}", "BOOL", _index, 1)

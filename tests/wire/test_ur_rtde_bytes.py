@@ -136,6 +136,15 @@ def test_written_inputs_are_kept_after_the_client_is_gone(robot, rtde2) -> None:
         assert other.frame().hex() == "00105501000000104024000000000000"
 
 
+def test_input_bits_are_kept_like_every_input(robot, rtde2) -> None:
+    names = "input_bit_registers0_to_31,input_bit_registers32_to_63,input_bit_register_64,input_bit_register_127"
+    assert rtde2.ask_text("I", b"", names) == b"\x01UINT32,UINT32,BOOL,BOOL"
+    rtde2.send("000e5501" + "80000001" + "0000ff00" + "01" + "00")
+    assert rtde2.ask_text("O", struct.pack(">d", 125), names) == b"\x01UINT32,UINT32,BOOL,BOOL"
+    assert rtde2.ask("000353") == "00045301"
+    assert rtde2.frame().hex() == "000e5501" + "80000001" + "0000ff00" + "01" + "00"
+
+
 def test_an_input_frame_of_the_wrong_size_changes_nothing(robot, rtde2) -> None:
     assert rtde2.ask_text("I", b"", "input_int_register_9") == b"\x01INT32"
     before = robot.get("seen.bad_frames")
