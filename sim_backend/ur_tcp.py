@@ -175,7 +175,9 @@ class TcpServer:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
         self.accepted += 1
-        self.clients.add(self._make_client(self, sock))
+        client = self._make_client(self, sock)
+        if client.open:  # one that has gone again before its greeting is not
+            self.clients.add(client)
 
 
 def _cannot_listen(error: OSError, where: str) -> EnvironmentFault:

@@ -2,6 +2,7 @@
 
 import math
 import socket
+import struct
 
 import pytest
 
@@ -114,6 +115,18 @@ def test_a_flood_of_requests_is_taken_a_little_at_a_time() -> None:
         while not emulator.seen.handshake:
             loop.run_once(1000)
         assert len(emulator.seen.handshake) < 1500
+    emulator.close()
+    loop.close()
+
+
+def test_a_client_gone_before_its_greeting_is_forgotten() -> None:
+    loop = EventLoop()
+    emulator = UrEmulator(loop, StillArm(), host=fresh_address())
+    with socket.create_connection((emulator.host, 29999)) as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # closes with RST
+    while not emulator.dashboard.accepted:
+        loop.run_once(1000)
+    assert not emulator.dashboard.clients
     emulator.close()
     loop.close()
 
