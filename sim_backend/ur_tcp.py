@@ -134,7 +134,7 @@ class TcpServer:
         self._sock.setblocking(False)
         try:
             self._sock.bind((host, port))
-            self._sock.listen(16)
+            self._sock.listen(128)  # beyond it the kernel drops a connection, and its client tries again a second later
         except OSError as error:
             self._sock.close()
             raise _cannot_listen(error, self._where) from error

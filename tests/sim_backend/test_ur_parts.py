@@ -1,5 +1,6 @@
 """The parts of the emulated arm that need no socket, and what it says when its ports are not free."""
 
+import contextlib
 import math
 import socket
 import struct
@@ -115,6 +116,19 @@ def test_a_flood_of_requests_is_taken_a_little_at_a_time() -> None:
         while not emulator.seen.handshake:
             loop.run_once(1000)
         assert len(emulator.seen.handshake) < 1500
+    emulator.close()
+    loop.close()
+
+
+def test_many_clients_may_come_at_once() -> None:
+    """Before the emulator has had its turn; beyond the queue a client would wait a second to try again."""
+    loop = EventLoop()
+    emulator = UrEmulator(loop, StillArm(), host=fresh_address())
+    with contextlib.ExitStack() as stack:
+        for _ in range(100):
+            stack.enter_context(socket.create_connection((emulator.host, 30004), timeout=0.5))
+        while emulator.rtde.accepted < 100:
+            loop.run_once(1000)
     emulator.close()
     loop.close()
 
