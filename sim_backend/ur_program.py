@@ -2,7 +2,8 @@
 
 URScript is not interpreted. ur_rtde's script is known by its header and replaced by the protocol it keeps on the
 registers (register numbers below are relative to its offset, 0 or 24): input integer 0 holds the command, output
-integer 0 says 1 (ready) or 2 (done).
+integer 0 says 1 (ready) or 2 (done). A command without a model is only `done`: a question among them (joint
+torques, inverse kinematics) finds in the output registers what the last answer left there.
 """
 
 from __future__ import annotations
