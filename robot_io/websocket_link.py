@@ -102,31 +102,35 @@ class WebSocketLink:
         Raises LinkLost on EOF, error or a broken frame, after everything that came before it was returned.
         """
         texts: list[tuple[bytes, int]] = []
+        self._raise_if_lost()
         try:
-            if self._lost is not None:
-                raise self._lost
             for _ in range(_RECEIVES_PER_CALL):
                 if not self._receive_once(texts):
                     break
         except LinkLost as lost:
+            self._lost = lost
             if not texts:
                 raise
-            self._lost = lost
         return texts
 
     def send_text(self, payload: bytes) -> None:
         """Send one text message whole and now. Raises LinkLost when the socket does not take all of it."""
+        self._raise_if_lost()
         self._protocol.send_text(payload)
         self._flush()
 
     def send_ping(self, payload: bytes) -> None:
         """Send a ping; `newest_pong_ns` tells when it was answered. Raises LinkLost like `send_text`."""
+        self._raise_if_lost()
         self._protocol.send_ping(payload)
         self._flush()
 
     def wait_readable(self, until_ns: int) -> bool:
-        """Wait until something arrives or `until_ns` has passed; tell which."""
-        return self._wait(select.POLLIN, until_ns)
+        """Wait until something arrives; False once `until_ns` has passed, however much still comes."""
+        left_ns = until_ns - self._clock()
+        poll = select.poll()
+        poll.register(self._socket, select.POLLIN)
+        return left_ns > 0 and bool(poll.poll(left_ns // 1_000_000))
 
     def abort(self) -> None:
         """Drop the connection with a reset, so that nothing of it is delivered later; never raises."""
@@ -189,8 +193,18 @@ class WebSocketLink:
         self._collect(texts, now_ns)
         self._flush()
         if self._protocol.state is not State.OPEN:
-            raise LinkLost(f"connection closed by the bridge ({self._protocol.close_exc})")
+            raise LinkLost(self._why_closed())
         return True
+
+    def _why_closed(self) -> str:
+        goodbye = self._protocol.close_rcvd
+        if goodbye is not None:
+            return f"connection closed by the bridge ({goodbye.code}{f' {goodbye.reason}' if goodbye.reason else ''})"
+        return f"the bridge sent no valid websocket frame ({self._protocol.parser_exc})"
+
+    def _raise_if_lost(self) -> None:
+        if self._lost is not None:
+            raise self._lost
 
     def _collect(self, texts: list[tuple[bytes, int]], now_ns: int) -> None:
         for event in self._protocol.events_received():
@@ -220,11 +234,6 @@ class WebSocketLink:
             raise LinkLost(f"sending failed ({error.strerror or error})") from error
         if sent != len(data):
             raise LinkLost("only part of a message could be sent: the bridge does not read")
-
-    def _wait(self, events: int, until_ns: int) -> bool:
-        poll = select.poll()
-        poll.register(self._socket, events)
-        return bool(poll.poll(max(0, until_ns - self._clock()) // 1_000_000))
 
 
 def _not_a_bridge(url: str, error: Exception) -> DeviceError:
