@@ -13,7 +13,7 @@ import math
 import msgspec
 
 from robot_io.messages import BodyTwist
-from robot_io.rosbridge_messages import is_stamped
+from robot_io.rosbridge_messages import decoder_of, is_stamped
 
 
 class Published(msgspec.Struct, frozen=True, gc=False):
@@ -124,9 +124,9 @@ class _Subscribers(msgspec.Struct, gc=False):
     subscribers: list[str]
 
 
-_decode_envelope = msgspec.json.Decoder(_Envelope).decode
-_decode_topic_type = msgspec.json.Decoder(_TopicType).decode
-_decode_subscribers = msgspec.json.Decoder(_Subscribers).decode
+_decode_envelope = decoder_of(_Envelope)
+_decode_topic_type = decoder_of(_TopicType)
+_decode_subscribers = decoder_of(_Subscribers)
 
 
 def decode_frame(text: bytes) -> Inbound:

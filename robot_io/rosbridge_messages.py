@@ -9,12 +9,15 @@ Source: message definitions of geometry_msgs, nav_msgs, sensor_msgs and ridgebac
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Annotated, TypeVar
 
 import msgspec
 
 from robot_io.messages import BaseStatus, BodyTwist, Pose2D
 from robot_io.planar_pose import yaw_from_quaternion
 
+T = TypeVar("T")
 _NAN = float("nan")
 Number = float | None
 
@@ -41,13 +44,17 @@ def is_stamped(type_name: str) -> bool:
     return type_name.rpartition("/")[2] == "TwistStamped"
 
 
+_Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), lt=2**32)]
+"""Signed or not: whatever either ROS keeps in 32 bits. A longer number could not become a float."""
+
+
 class _Stamp(msgspec.Struct, gc=False):
     """`secs`/`nsecs` come from ROS 1, `sec`/`nanosec` from ROS 2."""
 
-    secs: int = 0
-    nsecs: int = 0
-    sec: int = 0
-    nanosec: int = 0
+    secs: _Int32 = 0
+    nsecs: _Int32 = 0
+    sec: _Int32 = 0
+    nanosec: _Int32 = 0
 
 
 class _Header(msgspec.Struct, gc=False):
@@ -120,13 +127,25 @@ class _Status(msgspec.Struct, gc=False):
     measured_battery: Number
 
 
-# msgspec's decoding errors are subclasses of ValueError.
-_decode_transform = msgspec.json.Decoder(_TransformStamped).decode
-_decode_odometry = msgspec.json.Decoder(_Odometry).decode
-_decode_joints = msgspec.json.Decoder(_JointState).decode
-_decode_status = msgspec.json.Decoder(_Status).decode
-_decode_twist = msgspec.json.Decoder(_Twist).decode
-_decode_twist_stamped = msgspec.json.Decoder(_TwistStamped).decode
+def decoder_of(kind: type[T]) -> Callable[[bytes], T]:
+    """Return a function from JSON text to `kind`; it raises ValueError for anything else."""
+    decode = msgspec.json.Decoder(kind).decode  # its own errors are subclasses of ValueError
+
+    def decode_or_refuse(text: bytes) -> T:
+        try:
+            return decode(text)
+        except RecursionError as error:
+            raise ValueError("JSON nested too deeply") from error
+
+    return decode_or_refuse
+
+
+_decode_transform = decoder_of(_TransformStamped)
+_decode_odometry = decoder_of(_Odometry)
+_decode_joints = decoder_of(_JointState)
+_decode_status = decoder_of(_Status)
+_decode_twist = decoder_of(_Twist)
+_decode_twist_stamped = decoder_of(_TwistStamped)
 
 
 def decode_transform(msg: bytes) -> PoseReading:

@@ -236,6 +236,7 @@ def test_other_operations_are_named():
         b'{"op":3}',
         TRANSFORM[:-1].encode(),
         b'{"op":"publish","msg":{"x":NaN}}',
+        b'{"op":"publish","topic":"/a","msg":' + b"[" * 100_000 + b"]" * 100_000 + b"}",
     ],
 )
 def test_nonsense_is_a_value_error(text):
@@ -249,6 +250,15 @@ def test_the_wrong_message_is_a_value_error(decode):
         decode(b'{"data":true}')
     with pytest.raises(ValueError):
         decode(b"null")
+    with pytest.raises(ValueError):
+        decode(b'{"deeper":' * 100_000 + b"0" + b"}" * 100_000)
+
+
+@pytest.mark.parametrize("seconds", ["9" * 400, "4294967296", "-2147483649", "1.5", "null"])
+def test_a_stamp_that_is_no_32_bit_number_is_a_value_error(seconds):
+    assert decode_transform(json.dumps(json.loads(TRANSFORM)["msg"]).encode())
+    with pytest.raises(ValueError):
+        decode_transform(json.dumps(json.loads(TRANSFORM)["msg"]).replace("1795312357", seconds).encode())
 
 
 # poses
