@@ -8,8 +8,8 @@
 One thread, never blocking after `start`: call `drain` when `fileno()` is readable and at least every 20 ms.
 What the bridge gets wrong is handled here: it never reports an error (checked beforehand by
 `ridgeback_preflight`, and by hearing our own commands back), it delivers old commands after a hang (nothing
-that moves is sent on a quiet link; a link quiet for 0.3 s is reset, never closed in peace, never reopened), and
-it forwards NaN, which the base takes for full speed backwards (refused).
+that moves is sent on a quiet link; a link that is quiet, or gives back none of our commands, for 0.3 s is reset,
+never closed in peace, never reopened), and it forwards NaN, which the base takes for full speed backwards (refused).
 The base itself stops 0.25 s after the last command.
 """
 
@@ -19,7 +19,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal
 
-from robot_io.base_feed import BaseFeed, BasePose
+from robot_io.base_feed import BaseFeed, BasePose, CommandEcho
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
 from robot_io.config import TopicsConfig
 from robot_io.driver import DriverBase
@@ -42,7 +42,7 @@ PoseSource = Literal["mocap", "odometry", "joint_states"]
 FRESH_NS = 100 * NS_PER_MS
 """Nothing that moves is sent when the newest message from the bridge is older than this."""
 LINK_STALE_NS = 300 * NS_PER_MS
-"""The link is reset when the newest message from the bridge is older than this."""
+"""The link is reset when the newest message from the bridge is older than this, or a command not heard back since."""
 PING_PERIOD_NS = 100 * NS_PER_MS
 FIRST_MESSAGE_TIMEOUT_S = 2.0
 MAX_PENDING = 4096
@@ -87,6 +87,7 @@ class Ridgeback(DriverBase):
         self._samples: deque[Stamped[BaseFeed]] = deque()
         self._pose_times: deque[int] = deque(maxlen=100)
         self._last_ping_ns = 0
+        self._unheard_ns = 0  # when the oldest command left that may not have been heard back; 0 when there is none
         self._started = False
         self.newest_inbound_ns = 0
         """When the newest message of any topic arrived; 0 before the first."""
@@ -205,6 +206,7 @@ class Ridgeback(DriverBase):
         self._pose_times.clear()
         self._reader.reset()
         self.newest_inbound_ns = self.newest_pong_ns = self.sent_ns = self._last_ping_ns = 0
+        self._unheard_ns = 0
         self._counters = dict.fromkeys(self._counters, 0)
 
     def _receive(self) -> None:
@@ -230,6 +232,8 @@ class Ridgeback(DriverBase):
             for sample in samples:
                 if isinstance(sample.value, BasePose):
                     self._pose_times.append(received_ns)
+                elif isinstance(sample.value, CommandEcho):
+                    self._unheard_ns = 0
                 if len(self._samples) == MAX_PENDING:
                     self._samples.popleft()
                     self._counters["dropped_samples"] += 1
@@ -240,6 +244,8 @@ class Ridgeback(DriverBase):
             return
         if now_ns - self.newest_inbound_ns > LINK_STALE_NS:
             self._give_up(f"no message from the bridge for {LINK_STALE_NS / NS_PER_S:g} s")
+        elif self._unheard_ns and now_ns - self._unheard_ns > LINK_STALE_NS:  # they wait somewhere, or are thrown away
+            self._give_up(f"the bridge gave back none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
         elif now_ns - self._last_ping_ns >= PING_PERIOD_NS:
             self._last_ping_ns = now_ns
             self._counters["pings"] += 1
@@ -257,6 +263,8 @@ class Ridgeback(DriverBase):
             self._give_up(str(lost))
             return False
         self.sent_ns = self._clock()
+        if self._reader.counters["echo"] and not self._unheard_ns:  # before the first, ROS may still be connecting
+            self._unheard_ns = self.sent_ns
         self._counters["sent"] += 1
         return True
 
