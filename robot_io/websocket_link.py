@@ -42,6 +42,7 @@ def parse_url(url: str) -> WebSocketURI:
     """Return the parts of `ws://host:port/`. Raises ConfigError for anything else."""
     try:
         uri = parse_uri(url)
+        uri.host.encode("idna")  # as looking it up does
     except (InvalidURI, ValueError) as error:
         raise ConfigError(
             f"{url!r} is no websocket address", where="base url", do="Write it as ws://192.168.131.1:9090"
@@ -205,6 +206,8 @@ class WebSocketLink:
     def _raise_if_lost(self) -> None:
         if self._lost is not None:
             raise self._lost
+        if self._protocol.state is not State.OPEN:  # its goodbye came together with its handshake
+            raise LinkLost(self._why_closed())
 
     def _collect(self, texts: list[tuple[bytes, int]], now_ns: int) -> None:
         for event in self._protocol.events_received():

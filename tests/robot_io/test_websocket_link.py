@@ -72,6 +72,14 @@ def test_what_came_before_the_goodbye_is_still_returned_and_nothing_more_is_sent
             use()
 
 
+def test_a_goodbye_that_came_with_the_handshake(ends):
+    link, bridge = ends
+    link._protocol.receive_data(GOODBYE)
+    for use in (link.receive, lambda: link.send_text(b"{}"), lambda: link.send_ping(b"")):
+        with pytest.raises(LinkLost, match="1001"):
+            use()
+
+
 @pytest.mark.parametrize(
     "bad",
     [
