@@ -152,8 +152,9 @@ class Ridgeback(DriverBase):
 
     def drain(self) -> tuple[Stamped[BaseFeed], ...]:
         """Return every new sample, oldest first (`seq` counts per kind); also keeps the link alive and judged."""
+        now_ns = self._clock()  # before looking: what a pause of this process kept waiting is no silence
         self._receive()
-        self._tend(self._clock())
+        self._tend(now_ns)
         samples = tuple(self._samples)
         self._samples.clear()
         return samples
@@ -168,7 +169,6 @@ class Ridgeback(DriverBase):
         now_ns = self._clock()
         if now_ns - self.newest_inbound_ns > FRESH_NS:
             self._receive()  # perhaps only nobody has drained
-            now_ns = self._clock()
         self._tend(now_ns)
         if not self._started or self._link is None:
             return ZERO

@@ -39,7 +39,7 @@ CLOCK_NS = 2 * NS_PER_MS
 """How often silence is judged and repeats are sent."""
 PUBLISH_NS = 10 * NS_PER_MS
 LAST_ZEROS_NS = 500 * NS_PER_MS
-REST_M_PER_S = 0.005
+REST_M_PER_S = REST_RAD_PER_S = 0.005
 
 
 class GateJob(msgspec.Struct, frozen=True):
@@ -73,7 +73,7 @@ class GateProcess:
         self._loop = EventLoop()
         self._base_fd = -1
         self._end_ns = 0
-        self._clock_ns = 0
+        self._ran_ns = 0
 
     def run(self) -> None:
         """Serve until control is gone and the base was told zero."""
@@ -84,6 +84,7 @@ class GateProcess:
         self._loop.call_every(CLOCK_NS, self._on_clock)
         self._take(self._base.drain())  # what came while it started: control's first record already holds a pose
         self._publish()
+        self._ran_ns = monotonic_ns()
         try:
             self._loop.run()
         finally:
@@ -101,6 +102,7 @@ class GateProcess:
 
     def _read_control(self) -> None:
         """Judge every frame that waits; they are read before any silence is judged."""
+        now_ns = monotonic_ns()  # before reading: a pause of this process makes no frame old
         frames: list[GateFrame | None] = []
         gone = False
         while not gone and not self._end_ns:
@@ -114,7 +116,7 @@ class GateProcess:
                 frames.append(unpack_frame(payload))
             gone = not payload
         if frames:
-            self._state = gate.on_frames(self._limits, self._state, frames, monotonic_ns())
+            self._state = gate.on_frames(self._limits, self._state, frames, now_ns)
             verdict = self._state.latch
             newest = frames[-1]
             accepted = newest.seq if newest is not None and not verdict else self._record.accepted_seq
@@ -132,11 +134,8 @@ class GateProcess:
         self._send_due()
 
     def _on_clock(self, _deadline_ns: int) -> None:
-        self._read_control()
         now_ns = monotonic_ns()
-        if self._clock_ns:
-            self._state = gate.on_own_pause(self._state, now_ns - self._clock_ns)
-        self._clock_ns = now_ns
+        self._read_control()
         self._take(self._base.drain())
         self._state = gate.on_clock(self._state, now_ns)
         if self._base.health().state == LinkState.LOST:
@@ -151,10 +150,14 @@ class GateProcess:
         twist = self._record.odometry
         # The odometry must be newer than the last zeros' first effect: two base ticks after the latch.
         fresh = self._record.odometry_received_ns > self._end_ns - LAST_ZEROS_NS + 120 * NS_PER_MS
-        return fresh and abs(twist.vx) < REST_M_PER_S and abs(twist.vy) < REST_M_PER_S
+        still = abs(twist.vx) < REST_M_PER_S and abs(twist.vy) < REST_M_PER_S and abs(twist.omega) < REST_RAD_PER_S
+        return fresh and still
 
     def _send_due(self) -> None:
         now_ns = monotonic_ns()
+        # Here, where all ways out meet: whatever woke a frozen gate first, nothing leaves before this is judged.
+        self._state = gate.on_own_pause(self._state, now_ns - self._ran_ns)
+        self._ran_ns = now_ns
         if self._state.latch != self._told:
             self._told = self._state.latch
             cause = self._base.health().cause if self._told == Latch.LINK else ""
@@ -166,10 +169,12 @@ class GateProcess:
         wanted = gate.due(self._state, now_ns)
         if wanted is None:
             return
+        left_ns = self._base.sent_ns
         really = self._base.command(wanted)
         self._state = gate.sent(self._state, wanted, now_ns)
-        self._record = replace(self._record, sent=really, sent_ns=now_ns)
-        self._log.sent(now_ns, really)
+        if self._base.sent_ns != left_ns:  # over a lost link nothing leaves
+            self._record = replace(self._record, sent=really, sent_ns=now_ns)
+            self._log.sent(now_ns, really)
         self._publish()
 
     def _take(self, samples: tuple[Stamped[BaseFeed], ...]) -> None:

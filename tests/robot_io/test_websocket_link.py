@@ -10,7 +10,7 @@ from websockets.client import ClientProtocol
 from websockets.protocol import State
 
 from robot_io.messages import BodyTwist, LinkState
-from robot_io.ridgeback import Ridgeback
+from robot_io.ridgeback import LINK_STALE_NS, Ridgeback
 from robot_io.websocket_link import LinkLost, WebSocketLink, parse_url
 
 URL = "ws://127.0.0.1:1"
@@ -73,7 +73,7 @@ def test_what_came_before_the_goodbye_is_still_returned_and_nothing_more_is_sent
 
 
 def test_a_goodbye_that_came_with_the_handshake(ends):
-    link, bridge = ends
+    link, _ = ends
     link._protocol.receive_data(GOODBYE)
     for use in (link.receive, lambda: link.send_text(b"{}"), lambda: link.send_ping(b"")):
         with pytest.raises(LinkLost, match="1001"):
@@ -119,3 +119,23 @@ def test_a_wait_ends_in_time_however_much_still_comes(ends):
     bridge.sendall(frame(TEXT, b"more"))
     assert link.wait_readable(time.monotonic_ns() + 2_000_000_000)
     assert not link.wait_readable(time.monotonic_ns())
+
+
+def test_a_pause_of_this_process_right_after_reading_is_no_silence_of_the_bridge(ends):
+    link, _ = ends
+    now_ns = [time.monotonic_ns()]
+    base = Ridgeback(URL, clock=lambda: now_ns[0])
+    base._link, base._started, base._state = link, True, LinkState.UP
+    base.newest_inbound_ns = now_ns[0]
+    read = link.receive
+
+    def read_and_be_frozen() -> list[tuple[bytes, int]]:
+        texts = read()
+        now_ns[0] += LINK_STALE_NS + 1
+        return texts
+
+    link.receive = read_and_be_frozen
+    base.drain()
+    assert base.health().state == LinkState.UP  # what has come meanwhile is read next time
+    base.drain()
+    assert base.health().state == LinkState.LOST

@@ -1,0 +1,143 @@
+"""The gate's process around its judgement, one handler at a time, with a base that only writes down what it is told."""
+
+import os
+import socket
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from robot_io.base_feed import BaseFeed, BaseOdometry
+from robot_io.base_record import BASE_RECORD_BYTES, BaseRecord, unpack_base_record
+from robot_io.config import BaseConfig, FramesConfig
+from robot_io.gate_frame import GateFrame, pack_frame
+from robot_io.log_channels import Kind
+from robot_io.messages import BodyTwist, DeviceHealth, LinkState, Stamped
+from robot_io.ring import Ring
+from robot_io.shared_record import SharedRecord
+from robot_io.status_pipe import StatusPipe
+from safety.gate import OWN_PAUSE_NS, GateLimits, Latch
+from safety.gate_process import LAST_ZEROS_NS, GateJob, GateProcess
+
+LIMITS = GateLimits(0.15, 0.25, 0.5, 1.0, 10_000_000)
+FRAMES = FramesConfig(((1, 0, 0), (0, 1, 0), (0, 0, 1)), (0, 0, 0), (0, 0, 0))
+SLOW, ZERO = BodyTwist(0.005, 0.0, 0.0), BodyTwist()
+MS = 1_000_000
+
+
+class Base:
+    """Stands in for the driver."""
+
+    def __init__(self) -> None:
+        self.told: list[BodyTwist] = []
+        self.arrived: list[Stamped[BaseFeed]] = []
+        self.link = LinkState.UP
+        self.sent_ns = self.newest_inbound_ns = self.newest_pong_ns = 0
+
+    def drain(self) -> tuple[Stamped[BaseFeed], ...]:
+        arrived, self.arrived = tuple(self.arrived), []
+        return arrived
+
+    def command(self, wanted: BodyTwist) -> BodyTwist:
+        if self.link != LinkState.UP:
+            return ZERO
+        self.told.append(wanted)
+        self.sent_ns = time.monotonic_ns()
+        return wanted
+
+    def health(self) -> DeviceHealth:
+        return DeviceHealth(self.link, "pulled out" if self.link == LinkState.LOST else "", {}, 0.0)
+
+
+class Rig:
+    """A gate whose handlers are called by the test; `control` is the other end of its socket."""
+
+    def __init__(self) -> None:
+        self.control, gate_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.record_out = SharedRecord.create("record", BASE_RECORD_BYTES)
+        self.ring = Ring.create("gate", 1 << 16)
+        self.base = Base()
+        self.status, status = os.pipe()
+        job = GateJob(
+            BaseConfig(), FRAMES, LIMITS, gate_end.detach(), self.record_out.fd, self.ring.fd, status, wall_offset_ns=0
+        )
+        self.gate = GateProcess(job, self.base, StatusPipe(status))  # type: ignore[arg-type]
+        self.gate._ran_ns = time.monotonic_ns()
+        self.seq = 0
+
+    def frame(self, twist: BodyTwist) -> None:
+        self.seq += 1
+        self.control.send(pack_frame(GateFrame(self.seq, self.seq, time.monotonic_ns(), 2, twist)))
+
+    def record(self) -> BaseRecord:
+        found = self.record_out.read()
+        assert found is not None
+        return unpack_base_record(found[1])
+
+    def logged(self, kind: Kind) -> int:
+        return sum(record.kind == kind for record in self.ring.pop_all())
+
+
+@pytest.fixture
+def rig() -> Iterator[Rig]:
+    rig = Rig()
+    yield rig
+    rig.gate._loop.close()
+    rig.gate._control.close()
+    rig.gate._record_out.close()
+    rig.control.close()
+    rig.ring.close()
+    os.close(rig.status)
+    os.close(rig.gate._status._fd)
+
+
+@pytest.mark.parametrize("wake", ["_on_control", "_on_base", "_on_clock"])
+def test_a_gate_that_was_frozen_lets_nothing_out_whatever_wakes_it_first(rig, wake):
+    rig.frame(SLOW)
+    rig.gate._on_control(0)
+    assert rig.base.told == [SLOW]
+    rig.gate._ran_ns -= OWN_PAUSE_NS + MS
+    for _ in range(3):
+        rig.frame(SLOW)
+    getattr(rig.gate, wake)(0)
+    assert rig.base.told[1:] == [ZERO]
+    assert rig.record().latch_cause == Latch.PAUSED
+
+
+def test_over_a_lost_link_nothing_counts_as_sent(rig):
+    rig.frame(SLOW)
+    rig.gate._on_control(0)
+    assert rig.logged(Kind.GATE_SENT) == 1
+    sent_ns = rig.record().sent_ns
+    rig.base.link = LinkState.LOST
+    rig.gate._on_clock(0)
+    assert rig.record().latch_cause == Latch.LINK
+    assert rig.logged(Kind.GATE_SENT) == 0
+    assert (rig.record().sent, rig.record().sent_ns) == (SLOW, sent_ns)
+
+
+@pytest.mark.parametrize(
+    ("measured", "ends"),
+    [
+        (ZERO, True),
+        (BodyTwist(0.01, 0.0, 0.0), False),
+        (BodyTwist(0.0, -0.01, 0.0), False),
+        (BodyTwist(omega=0.01), False),
+    ],
+)
+def test_the_last_zeros_go_on_until_the_base_rests(rig, measured, ends):
+    rig.gate._loop.add_fd(rig.gate._control.fileno(), rig.gate._on_control)
+    rig.frame(SLOW)
+    rig.gate._on_control(0)
+    rig.control.close()
+    rig.gate._on_control(0)
+    stopped: list[bool] = []
+    rig.gate._loop.stop = lambda: stopped.append(True)
+    since_ns = rig.gate._end_ns - LAST_ZEROS_NS
+    rig.base.arrived.append(Stamped(BaseOdometry(measured), 0, since_ns + 130 * MS, 0.0))
+    rig.gate._on_clock(0)
+    assert bool(stopped) == ends
+    rig.gate._end_ns = time.monotonic_ns()  # half a second is over
+    rig.gate._on_clock(0)
+    assert stopped
+    assert set(rig.base.told[1:]) == {ZERO}
