@@ -19,7 +19,7 @@ from sim_backend.contact_outcome import FREE, ContactMode, ContactOutcome
 from sim_backend.corner import CornerArguments, solve_at_corner
 from sim_backend.floor import Floor
 from sim_backend.slider import SliderModel
-from sim_backend.slider_exact import ContactSolution, ContactSolver, Grain, Moving, solve_exact
+from sim_backend.slider_exact import SEPARATING, ContactSolution, ContactSolver, Grain, Moving, solve_exact
 
 __all__ = ["FREE", "ContactMode", "ContactOutcome", "PushedSlider"]
 
@@ -133,37 +133,11 @@ class PushedSlider:
             left = (1.0 - done) * dt_s
             v_body_x = self._cos * vx + self._sin * vy
             v_body_y = self._cos * vy - self._sin * vx
-            if self._floor is not None:
-                self._take_grip(self._floor)
-            if self._corner >= 0:
-                choice = solve_at_corner(
-                    self._outline.rows, self._corner, self._solve, v_body_x, v_body_y, self._arguments()
-                )
-                if choice is None:
-                    self._touching, self._corner = False, -1
-                    return FREE
-                solution: ContactSolution
-                solution, self._nx, self._ny, self._face = choice
-                if self._face >= 0:
-                    self._corner = -1
-            else:
-                solution = self._solve(
-                    self._cx - self._cof_x,
-                    self._cy - self._cof_y,
-                    self._nx,
-                    self._ny,
-                    v_body_x,
-                    v_body_y,
-                    self._d,
-                    self._f_max,
-                    self._mu,
-                    self._grain,
-                )
+            solution = self._answer(v_body_x, v_body_y)
             if not isinstance(solution, Moving):
                 # leaving, or brushing along the face without a normal motion: no force is needed for either
-                self._touching = False
+                self._touching, self._corner = False, -1
                 return FREE
-            self._push_x, self._push_y = solution.fx, solution.fy
             outcome = self._outcome_of(solution)
             share = self._share_to_corner(solution.slip, left)
             self._move(solution, left * share)
@@ -172,6 +146,35 @@ class PushedSlider:
             if share == 1.0 or not self._touching:
                 break
         return outcome
+
+    def _answer(self, vx: float, vy: float) -> ContactSolution:
+        """Return how the slider answers the ball's velocity (BODY, m/s); notes the push, and the face at a corner."""
+        floor = self._floor
+        solution: ContactSolution = SEPARATING
+        # where the floor holds hangs on the push, and the push on where it holds: last step's push is only a guess
+        for _ in range(2 if floor is not None and floor.follows_push else 1):
+            if floor is not None:
+                self._take_grip(floor)
+            solution = self._solved(vx, vy)
+            if not isinstance(solution, Moving):
+                break
+            self._push_x, self._push_y = solution.fx, solution.fy
+        if self._face >= 0:
+            self._corner = -1
+        return solution
+
+    def _solved(self, vx: float, vy: float) -> ContactSolution:
+        """Solve the contact as it stands, on a face or at a corner."""
+        if self._corner < 0:
+            return self._solve(
+                self._cx - self._cof_x, self._cy - self._cof_y, self._nx, self._ny, vx, vy,
+                self._d, self._f_max, self._mu, self._grain,
+            )  # fmt: skip
+        choice = solve_at_corner(self._outline.rows, self._corner, self._solve, vx, vy, self._arguments())
+        if choice is None:
+            return SEPARATING
+        solution, self._nx, self._ny, self._face = choice
+        return solution
 
     def _first_touch(self, x: float, y: float, dx: float, dy: float) -> float | None:
         """Find the first touch of a ball that is clear or just leaving; take its contact."""
@@ -200,7 +203,7 @@ class PushedSlider:
                     self._corner, self._cx, self._cy = corner, row[7], row[8]
 
     def _take_grip(self, floor: Floor) -> None:
-        """Ask the floor what holds the slider now; the push is along the last force, at a first touch the normal."""
+        """Ask the floor what holds the slider now; the push is along the force so far, at a first touch the normal."""
         size = hypot(self._push_x, self._push_y)
         self._cof_x, self._cof_y, self._d, self._f_max, self._grain = floor.grip(
             self.x_m, self.y_m, self._cos, self._sin, self._push_x / size, self._push_y / size

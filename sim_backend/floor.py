@@ -63,6 +63,7 @@ class Floor:
         self._model = model
         self._effects = effects
         self._moment = _pressure_moment(model.shape, pressure) if effects.turning == "along-push" else None
+        self.follows_push = effects.shift_m > 0 or self._moment is not None
         self._patches: Callable[[float, float, float, float], tuple[float, float, float, float]] | None = None
         if effects.patch_strength > 0:
             points = model.shape.rim_points() if pressure == "rim" else model.shape.grid_points(SUPPORT_ACROSS)

@@ -42,6 +42,19 @@ def test_centre_of_friction_runs_ahead_along_the_push():
     assert grip(BOX, push=(0.6, 0.8), shift_m=0.045)[:2] == pytest.approx((0.027, 0.036))
 
 
+def test_the_centre_of_friction_follows_the_push_within_the_step():
+    # without contact friction the push goes through the disc's middle, and so through the shifted centre: no turning
+    disc = SliderModel(Circle(0.1), 1.0, 0.005, 0.0)
+    slider = PushedSlider(disc, (0.0, 0.0, 0.0), 0.05, floor=Floor(disc, "uniform", FloorEffects(shift_m=0.045)))
+    x, y, force_y = -0.15, 0.0, 0.0
+    for i in range(2000):
+        to = (x + 1e-4, y + 1e-4 * math.sin(i / 500))
+        force_y = slider.step((x, y), to, 1e-3).force_y
+        x, y = to
+    assert abs(force_y) > 0.3  # the push has turned
+    assert slider.heading_rad == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_push_so_high_that_the_slider_tips_is_refused():
     with pytest.raises(ConfigError, match="tips"):
         Floor(BOX, "uniform", FloorEffects(shift_m=0.2))

@@ -74,3 +74,14 @@ def test_simulation_finds_the_same_limit(body, frictionless, k_f, ratio):
     body = PushedBody(body.round, body.rho_m, body.d_m, body.ball_radius_m, body.shift_m, ratio)
     expected = (frictionless_limit if frictionless else sticking_limit)(body, k_f)
     assert simulated_limit(body, k_f, frictionless=frictionless, near=expected) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("body", [
+    PushedBody(round=False, rho_m=0.1, d_m=0.006, ball_radius_m=0.05, shift_m=0.045, along_over_across=0.8),
+    PushedBody(round=True, rho_m=0.1, d_m=0.0067, ball_radius_m=0.01, shift_m=0.045, along_over_across=1.03),
+    PushedBody(round=True, rho_m=0.03, d_m=0.02),
+])  # fmt: skip
+def test_simulation_finds_the_limit_of_small_sliders_too(body):
+    expected = frictionless_limit(body, 0.6)
+    assert simulated_limit(body, 0.6, frictionless=True, near=expected) == pytest.approx(expected, rel=0.01)

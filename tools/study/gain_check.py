@@ -14,8 +14,12 @@ from sim_backend.gain_limits import PushedBody
 from sim_backend.shapes import Circle, Rectangle
 from sim_backend.slider import SliderModel
 
-STEP_S = 0.004
 SPEED_M_PER_S = 0.1
+LONGEST_STEP_S = 0.004
+STEP_SHARE = 0.003
+"""The step is at most this share of the time to push the slider by half its length: that is what its delay costs."""
+EULER_SHARE = 0.5
+"""... and this share of the time in which a contact without friction slides back to a face's middle (not beyond 2)."""
 START_OFFSET_M = 1e-4
 """Small, so that the weave stays linear."""
 SWINGS = 6
@@ -38,15 +42,16 @@ def simulated_limit(body: PushedBody, k_f: float, *, frictionless: bool, near: f
 def growth_rate(body: PushedBody, k_f: float, k_y_rad_per_m: float, *, frictionless: bool) -> float:
     """Return the rate (1/s) at which a small weave grows, from the extremes of the ball's lateral place."""
     slider = _slider(body, 0.0 if frictionless else STICKING_FRICTION)
+    step_s = _step_s(body, slides=frictionless)
     x, y = -body.rho_m - body.ball_radius_m, START_OFFSET_M
     fx, fy, t = 1.0, 0.0, 0.0
     extremes: list[tuple[float, float]] = []
     old_dy = 0.0
     while len(extremes) < SWINGS + 2 and t < LONGEST_S:
         theta_p = (k_f + 1) * atan2(fy, fx) + k_y_rad_per_m * y
-        dx, dy = SPEED_M_PER_S * STEP_S * cos(theta_p), SPEED_M_PER_S * STEP_S * sin(theta_p)
-        outcome = slider.step((x, y), (x + dx, y + dy), STEP_S)
-        x, y, t = x + dx, y + dy, t + STEP_S
+        dx, dy = SPEED_M_PER_S * step_s * cos(theta_p), SPEED_M_PER_S * step_s * sin(theta_p)
+        outcome = slider.step((x, y), (x + dx, y + dy), step_s)
+        x, y, t = x + dx, y + dy, t + step_s
         fx, fy = outcome.force_x, outcome.force_y
         if old_dy * dy < 0:
             extremes.append((t, abs(y)))
@@ -55,6 +60,14 @@ def growth_rate(body: PushedBody, k_f: float, k_y_rad_per_m: float, *, frictionl
         return log(max(abs(y), 1e-300) / START_OFFSET_M) / t  # no weave: it only runs off or comes back
     (t_first, first), (t_last, last) = extremes[2], extremes[-1]
     return log(last / first) / (t_last - t_first)
+
+
+def _step_s(body: PushedBody, *, slides: bool) -> float:
+    longest_m = STEP_SHARE * body.rho_m
+    if slides and not body.round:
+        reach = body.rho_m + body.shift_m + body.ball_radius_m
+        longest_m = min(longest_m, EULER_SHARE * body.d_m**2 / reach)
+    return min(LONGEST_STEP_S, longest_m / SPEED_M_PER_S)
 
 
 def _slider(body: PushedBody, contact_friction: float) -> PushedSlider:
