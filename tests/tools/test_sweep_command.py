@@ -175,6 +175,36 @@ def test_a_failing_item_is_rows_and_not_an_abort(tmp_path, grid, capsys, monkeyp
     assert rows_of(out)[4]["error"] == "ZeroDivisionError: no such thing"
 
 
+def test_of_an_item_only_the_failing_case_is_an_error(tmp_path, grid, capsys, monkeypatch):
+    from sim_backend import batch
+
+    real = batch.run_batch
+
+    def broken(lanes, timing):
+        if any(lane.contact_friction == 0.3 and lane.s0_m == 0.1 for lane in lanes):
+            raise ZeroDivisionError("no such thing")
+        return real(lanes, timing)
+
+    assert push(capsys, grid, "--out", tmp_path / "well")[0] == 0
+    monkeypatch.setattr(batch, "run_batch", broken)
+    assert push(capsys, grid, "--out", tmp_path / "out", "--workers", 1)[0] == 0
+    well, rows = rows_of(tmp_path / "well"), rows_of(tmp_path / "out")
+    assert [row["code"] == "error" for row in rows] == [i == 4 for i in range(9)]
+    assert rows[:4] + rows[5:] == well[:4] + well[5:]
+
+
+def test_a_case_beyond_the_range_of_numbers_is_an_error_and_no_nan(tmp_path, capsys):
+    path = tmp_path / "far.toml"
+    path.write_text("[fixed]\ns0_m = 0.1\n[grid]\ntau_max_Nm = [1e-300]\n[time]\nduration_s = 1\nrecord_s = 1\n")
+    code, summary, _ = push(capsys, path, "--out", tmp_path / "out", "--json")
+    assert code == 0
+    assert summary["shapes"]["square"]["ended"]["error"] == 1
+    (row,) = rows_of(tmp_path / "out")
+    assert row["code"] == "error"
+    assert row["x"] == ""
+    assert "range of numbers" in row["error"]
+
+
 def test_gains_open_loop_and_step_change_every_case(tmp_path, grid, capsys):
     code, summary, _ = push(
         capsys,
@@ -221,6 +251,11 @@ def test_monte_carlo_draws_are_seeded(tmp_path, capsys):
         ("contact_friction = [0, 0.3, 1.0]", 'contact_friction = [0, "much"]', "contact_friction"),
         ("length_m = 0.4", "length_m = 0.0", "length_m"),
         ("length_m = 0.4", "length_m = nan", "length_m"),
+        ("length_m = 0.4", "length_m = 1e200", "length_m"),
+        ("[time]", "[random]\nsamples = 3\nranges = 3\n[time]", "ranges"),
+        ("[time]", "[random]\nsamples = 3\n[random.ranges]\ns0_m = [0.0, 0.1]\n[time]", "both vary s0_m"),
+        (f"{GRID[GRID.index('[grid]') : GRID.index('[time]')]}", "[random]\nsamples = 3\nranges = {}\n", "nothing"),
+        ("[time]", "".join(f"{k} = {[0.1] * 1000}\n" for k in ("k_f", "f_max_N", "y0_m")) + "[time]", "cases"),
         ('shape = "rectangle"', 'shape = "star"', "circle"),
         ("length_m = 0.4", "lenght_m = 0.4", "length_m"),
         ("dt_s = 0.01", "dt_s = 0.007", "divide"),

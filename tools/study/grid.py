@@ -17,7 +17,7 @@ import msgspec
 from msgspec import Meta
 
 from robot_io import toml_text
-from robot_io.config_types import NonNegative, Positive, Table
+from robot_io.config_types import Positive, Table
 from robot_io.errors import ConfigError
 from robot_io.table_check import build
 from robot_io.toml_text import Origins
@@ -29,24 +29,28 @@ MOST_STATES = 20_000_000
 """Kept states of a study: about a gigabyte."""
 
 
+Length = Annotated[float, Meta(gt=0, le=1000)]
+Place = Annotated[float, Meta(ge=-1000, le=1000)]
+
+
 class Case(Table, frozen=True):
     """Parameters of one simulated push, as a grid file names them (a `square` has the side `length_m`)."""
 
     shape: Literal["square", "rectangle", "circle"] = "square"
-    length_m: Positive = 1.0
-    width_m: Positive = 1.0
-    radius_m: Positive = 0.5
+    length_m: Length = 1.0
+    width_m: Length = 1.0
+    radius_m: Length = 0.5
     pressure: Literal["uniform", "rim", "point"] = "uniform"
-    tau_max_Nm: NonNegative = 0.0
+    tau_max_Nm: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
     """Greatest friction torque of the floor; 0: from `pressure`."""
-    f_max_N: Positive = 1.0
+    f_max_N: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
     contact_friction: Annotated[float, Meta(ge=0, le=10)] = 0.5
-    y0_m: float = 0.0
+    y0_m: Place = 0.0
     phi0_rad: Annotated[float, Meta(ge=-math.pi, le=math.pi)] = 0.0
-    s0_m: float = 0.0
+    s0_m: Place = 0.0
     k_f: Annotated[float, Meta(ge=0, le=10)] = 0.1
     k_y_rad_per_m: Annotated[float, Meta(ge=0, le=10)] = 0.01
-    speed_m_per_s: Positive = 0.1
+    speed_m_per_s: Annotated[float, Meta(gt=0, le=100)] = 0.1
     controller: Literal["force", "open-loop"] = "force"
 
 
@@ -97,17 +101,21 @@ def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None)
     data, origins = toml_text.parse(text, name)
     file = build(GridFile, data, origins, name)
     fixed = {**data.get("fixed", {}), **changes}
-    clash = sorted(set(changes) & (set(file.grid) | set(file.random.get("ranges", {}))))
-    if clash:
+    ranges = _random_table(file, origins, name)
+    drawn = ranges.ranges if ranges else {}
+    if clash := sorted(set(changes) & (set(file.grid) | set(drawn))):
         raise ConfigError(
             f"the grid varies {clash[0]}, which the command line fixes", where=name, do="Drop one of them"
         )
-    draws = _draws(file, origins, name)
+    if twice := sorted(set(file.grid) & set(drawn)):
+        raise ConfigError(f"[grid] and [random] both vary {twice[0]}", where=name, do="Drop one of them")
+    if not file.grid and not drawn:
+        raise ConfigError("this grid varies nothing", where=name, do="Add a [grid] or a [random.ranges] table")
+    count = math.prod(map(len, file.grid.values())) * (ranges.samples if ranges else 1)
+    if count > MOST_CASES:
+        raise ConfigError(f"this grid has {count} cases, more than {MOST_CASES}", where=name)
+    draws = _draws(ranges)
     combinations = _combinations(file, origins, name)
-    if not file.grid and not file.random:
-        raise ConfigError("this grid varies nothing", where=name, do="Add a [grid] or a [random] table")
-    if len(draws) * len(combinations) > MOST_CASES:
-        raise ConfigError(f"this grid has {len(draws) * len(combinations)} cases, more than {MOST_CASES}", where=name)
     cases = tuple(
         msgspec.convert({**fixed, **combination, **draw}, Case) for combination in combinations for draw in draws
     )
@@ -133,9 +141,9 @@ def _combinations(file: GridFile, origins: Origins, name: str) -> list[dict[str,
     return [dict(zip(file.grid, values, strict=True)) for values in itertools.product(*file.grid.values())]
 
 
-def _draws(file: GridFile, origins: Origins, name: str) -> list[dict[str, Any]]:
+def _random_table(file: GridFile, origins: Origins, name: str) -> RandomTable | None:
     if not file.random:
-        return [{}]
+        return None
     table = build(RandomTable, file.random, {k[1:]: v for k, v in origins.items() if k[0] == "random"}, name)
     for key, (low, high) in table.ranges.items():
         where = origins.get(("random", "ranges", key), name)
@@ -143,6 +151,12 @@ def _draws(file: GridFile, origins: Origins, name: str) -> list[dict[str, Any]]:
         _check_parameter(key, high, where)
         if low > high:
             raise ConfigError(f"the range of `{key}` ends below its start", where=where)
+    return table
+
+
+def _draws(table: RandomTable | None) -> list[dict[str, Any]]:
+    if table is None:
+        return [{}]
     dice = random.Random(table.seed)
     return [{key: dice.uniform(*ends) for key, ends in table.ranges.items()} for _ in range(table.samples)]
 

@@ -1,11 +1,12 @@
 """The unit a study is cut into for workers: a few lanes of one shape, and what came of them.
 
-A worker gets one item at a time and answers with rows (one a lane, for `results.csv`) and arrays. An item that
-fails answers with rows that say so.
+A worker gets one item at a time and answers with rows (one a lane, for `results.csv`) and arrays. A lane that fails
+is a row that says so.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -68,29 +69,37 @@ def run_lane_item(item: LaneItem) -> Part:
     """Run an item's lanes; arrays: `states`, shape (cases, records, 6), NaN after a lane's end."""
     import numpy as np
 
+    try:
+        return _run(item)
+    except PushError as error:
+        told = str(error)
+    except Exception as error:  # one bad case must not cost the study; its row names the defect
+        told = f"{type(error).__name__}: {error}"
+    if len(item.cases) > 1:  # which case is it? the others are well
+        parts = [run_lane_item(LaneItem(item.first + i, (case,), item.timing)) for i, case in enumerate(item.cases)]
+        states = np.concatenate([part.arrays["states"] for part in parts])
+        return Part([row for part in parts for row in part.rows], {"states": states})
+    return Part([_failed(item.first, item.cases[0], told)], {"states": np.full((1, item.timing.records, 6), np.nan)})
+
+
+def _run(item: LaneItem) -> Part:
+    import numpy as np
+
     from sim_backend.batch import run_batch
 
-    try:
-        results, states = run_batch([lane_of(case) for case in item.cases], item.timing)
-    except PushError as error:
-        return _failed(item, str(error))
-    except Exception as error:  # one bad item must not cost the study; its rows name the defect
-        return _failed(item, f"{type(error).__name__}: {error}")
-    rows = [
-        {**_parameters(item.first + i, case), **_result(result)}
-        for i, (case, result) in enumerate(zip(item.cases, results, strict=True))
-    ]
+    results, states = run_batch([lane_of(case) for case in item.cases], item.timing)
+    rows: list[Row] = []
+    for i, (case, result) in enumerate(zip(item.cases, results, strict=True)):
+        if all(map(math.isfinite, (*result.final, result.max_abs_y_c_m, result.max_abs_theta_p_rad))):
+            rows.append(_parameters(item.first + i, case) | _result(result))
+        else:
+            rows.append(_failed(item.first + i, case, "its state left the range of numbers"))
+            states[i] = np.nan
     return Part(rows, {"states": np.asarray(states)})
 
 
-def _failed(item: LaneItem, sentence: str) -> Part:
-    import numpy as np
-
-    rows: list[Row] = [
-        {**_parameters(item.first + i, case), "code": LaneEnd.ERROR.name.lower(), "steps": 0, "error": sentence}
-        for i, case in enumerate(item.cases)
-    ]
-    return Part(rows, {"states": np.full((len(item.cases), item.timing.records, 6), np.nan)})
+def _failed(number: int, case: Case, sentence: str) -> Row:
+    return _parameters(number, case) | {"code": LaneEnd.ERROR.name.lower(), "steps": 0, "error": sentence}
 
 
 def _parameters(number: int, case: Case) -> Row:
