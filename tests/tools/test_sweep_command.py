@@ -18,6 +18,7 @@ from tools import cli
 from tools.study import items as sweep_items
 from tools.study.engine import run_items
 from tools.study.items import COLUMNS
+from tools.study.plan import LANE_SOURCES, ROOT
 
 GRID = """
 name = "small"
@@ -151,6 +152,13 @@ def test_a_part_of_another_study_is_run_again(tmp_path, grid, capsys):
     (tmp_path / "one" / "parts" / "000000.npz").write_bytes(foreign)
     push(capsys, grid, "--out", tmp_path / "one", "--gains", "0.3,0.2", "--workers", 1, "--resume")
     assert (tmp_path / "one" / "results.csv").read_bytes() == expected
+
+
+def test_all_program_text_of_a_lane_is_in_the_fingerprint():
+    code = "import sys, tools.study.items, sim_backend.batch; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    ours = {name for name in loaded if name.startswith(("sim_backend.", "tools.study."))}
+    assert ours == {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in LANE_SOURCES}
 
 
 def test_a_failing_item_is_rows_and_not_an_abort(tmp_path, grid, capsys, monkeypatch):

@@ -78,6 +78,12 @@ def test_flags_of_other_studies_are_refused(tmp_path, capsys, argv):
     assert not (tmp_path / "out").exists()
 
 
+def test_gains_that_no_rig_may_have_are_refused_before_anything_runs(tmp_path, capsys):
+    assert cli.main(["sweep", "hardware", "--gains=0.1,5", "--out", str(tmp_path / "out")]) == 2
+    assert "k_y_rad_per_m" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.long
 @pytest.mark.timeout(600)
 def test_the_whole_experiment_does_what_the_paper_says(tmp_path, capsys):

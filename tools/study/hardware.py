@@ -166,7 +166,8 @@ def sources(root: Path) -> tuple[Path, ...]:
     folders = ("control", "safety", "sim_backend", "robot_io")
     found = [path for folder in folders for path in sorted((root / folder).glob("*.py"))]
     found += sorted((root / "robot_io" / "rigs").glob("*.toml"))
-    return (*found, root / "tools/run/lockstep.py", root / "tools/run/tick_core.py", root / "tools/study/hardware.py")
+    found += [root / f"tools/run/{name}.py" for name in ("lockstep", "run_state", "tick_core")]
+    return (*found, root / "tools/study/hardware.py")
 
 
 def check_flags(dt_s: float | None, open_loop: bool) -> None:

@@ -15,6 +15,7 @@ from tools.study.hardware import (
 from tools.study.hardware import (
     check_flags,
     hardware_items,
+    rig_of,
     run_hardware_item,
     sources,
 )
@@ -26,7 +27,13 @@ if TYPE_CHECKING:
     from tools.study.store import Store
 
 ROOT = Path(__file__).resolve().parents[2]
-LANE_SOURCES = tuple(ROOT / name for name in ("sim_backend/batch.py", "sim_backend/shapes.py", "tools/study/items.py"))
+LANE_SOURCES = tuple(
+    ROOT / f"{name}.py"
+    for name in (
+        "sim_backend/batch", "sim_backend/lanes", "sim_backend/shapes", "sim_backend/slider",
+        "sim_backend/slider_exact", "tools/study/grid", "tools/study/items",
+    )
+)  # fmt: skip
 
 
 class Plan(NamedTuple):
@@ -56,9 +63,10 @@ def lanes_plan(study: Study) -> Plan:
 
 
 def hardware_plan(gains: tuple[float, float] | None, dt_s: float | None, open_loop: bool) -> Plan:
-    """Return the plan of the simulated experiment. Raises UsageError for flags it has no use for."""
+    """Return the plan of the simulated experiment. Raises UsageError for unfit flags, ConfigError for unfit gains."""
     check_flags(dt_s, open_loop)
     items = hardware_items(gains)
+    rig_of(items[0])  # gains that no rig may have are found before anything runs
     definition = msgspec.to_builtins(items)
     return Plan("hardware", definition, sources(ROOT), items, run_hardware_item, _nothing, _write_hardware)
 
