@@ -186,6 +186,11 @@ def _tell(result: dict[str, Any], args: argparse.Namespace) -> None:
         f"{result['margin']:.2g} to the limit {result['limit_k_y_rad_per_m']:.3g} rad/m over {result['assumed']} "
         "assumed sliders"
     )
+    if best["k_f"] < args.k_f:
+        tell(
+            f"  k_f {args.k_f:g} is not taken: beyond {result['fast_loop_k_f']:.3g} the force's direction runs away "
+            f"for some slider, and the recommended k_f stays below {MOST_K_F_SHARE:g} of that"
+        )
     tell(
         f"what it costs: {result['offset_m_per_degree']:.2g} m of steady offset for each degree of error in the "
         f"force's direction, {result['offset_m_per_newton']:.2g} m for each newton of bias at {args.slide_force_N:g} N"
@@ -206,7 +211,9 @@ def _draw(bodies: Sequence[PushedBody], recommended: tuple[float, float], what: 
     from tools.study.figures import save
     from tools.study.tune_map import draw
 
-    return save(draw([(f, limit(bodies, f)) for f in MAP_K_F], recommended, what), out, "gain_map")
+    fast = fast_loop_k_f(bodies)  # a cliff, not a slope
+    k_f = sorted((*MAP_K_F, *((math.nextafter(fast, 0.0), fast) if MAP_K_F[0] < fast < MAP_K_F[-1] else ())))
+    return save(draw([(f, limit(bodies, f)) for f in k_f], recommended, what), out, "gain_map")
 
 
 def _folder(out: str | None) -> Path:

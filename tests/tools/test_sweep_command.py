@@ -213,6 +213,16 @@ def test_a_case_beyond_the_range_of_numbers_is_an_error_and_no_nan(tmp_path, cap
     assert "range of numbers" in row["error"]
 
 
+def test_the_figure_draws_a_lost_push_to_its_very_end():
+    from tools.study.figures import trajectories
+    from tools.study.grid import Case
+
+    states = np.full((1, 3, 6), np.nan)
+    states[0, 0] = 0.0  # lost before the second record
+    figure = trajectories([Case()], states, np.array([[0.3, 0.1]]), "lost")
+    assert figure.axes[0].lines[0].get_xydata().tolist() == [[0.0, 0.0], [0.3, 0.1]]
+
+
 def test_gains_open_loop_and_step_change_every_case(tmp_path, grid, capsys):
     code, summary, _ = push(
         capsys,

@@ -35,8 +35,13 @@ def save(figure: Figure, out: Path, name: str) -> list[str]:
     return [f"{name}.png", f"{name}.svg"]
 
 
-def trajectories(cases: Sequence[Case], states: Floats, title: str) -> Figure:
-    """Draw the path of every slider's centre, one panel a shape. `states`: (cases, records, 6)."""
+def trajectories(cases: Sequence[Case], states: Floats, ends: Floats, title: str) -> Figure:
+    """Draw the path of every slider's centre, one panel a shape.
+
+    `states`: (cases, records, 6), NaN after an end; `ends`: (cases, 2), the last x, y (it lies between two records).
+    """
+    import numpy as np
+
     shapes = list(dict.fromkeys(case.shape for case in cases))
     figure = _figure(7.0, 1.2 + 1.9 * len(shapes))
     panels = figure.subplots(len(shapes), 1, sharex=True, squeeze=False)[:, 0]
@@ -44,7 +49,8 @@ def trajectories(cases: Sequence[Case], states: Floats, title: str) -> Figure:
         chosen = [i for i, case in enumerate(cases) if case.shape == shape]
         drawn = chosen[:: -(-len(chosen) // MOST_LINES)]
         for i in drawn:
-            axes.plot(states[i, :, 0], states[i, :, 1], linewidth=0.5, alpha=0.4)
+            kept = states[i, ~np.isnan(states[i, :, 0]), :2]
+            axes.plot(*np.vstack([kept, ends[i]]).T, linewidth=0.5, alpha=0.4)
         axes.axhline(0.0, color="black", linewidth=0.8, linestyle="--")
         some = "" if len(drawn) == len(chosen) else f", {len(drawn)} of them drawn"
         axes.set_title(f"{shape}: {len(chosen)} pushes{some}", fontsize=9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -97,7 +98,8 @@ def _write_lanes(study: Study, store: Store, parts: list[Part]) -> tuple[dict[st
     summary = summarise(study, rows, states)
     store.write_json("summary.json", summary)
     title = f"{study.name}: {len(study.cases)} pushes of {study.timing.steps * study.timing.dt_s:g} s"
-    files = sweep_figures.save(sweep_figures.trajectories(study.cases, states, title), store.out, "trajectories")
+    ends = np.array([(row.get("x", math.nan), row.get("y", math.nan)) for row in rows], dtype=np.float64)
+    files = sweep_figures.save(sweep_figures.trajectories(study.cases, states, ends, title), store.out, "trajectories")
     if chosen := sample_cases(study.cases)[:8]:
         shown = [study.cases[i] for i in chosen]
         files += sweep_figures.save(sweep_figures.samples(shown, study.timing), store.out, "samples")
