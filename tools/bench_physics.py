@@ -56,7 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and tell; return the exit code."""
+    """Measure and tell; return the exit code. Raises EnvironmentFault without numba."""
+    import sim_backend.batch  # noqa: F401 - says what is missing before anything is measured
+
     study = paper_study({})
     lanes = [lane_of(case) for case in study.cases]
     with tempfile.TemporaryDirectory(prefix="push-bench-") as folder:

@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_io.errors import PushError
+from robot_io.errors import EnvironmentFault, PushError
 from tools import cli
 from tools.study import items as sweep_items
 from tools.study.engine import run_items
+from tools.study.grid import load_grid
 from tools.study.items import COLUMNS
 from tools.study.plan import LANE_SOURCES, ROOT
 
@@ -199,6 +200,19 @@ def test_of_an_item_only_the_failing_case_is_an_error(tmp_path, grid, capsys, mo
     well, rows = rows_of(tmp_path / "well"), rows_of(tmp_path / "out")
     assert [row["code"] == "error" for row in rows] == [i == 4 for i in range(9)]
     assert rows[:4] + rows[5:] == well[:4] + well[5:]
+
+
+@pytest.mark.parametrize("command", [("sweep",), ("bench", "physics")])
+def test_without_numba_it_is_one_sentence_and_no_row(tmp_path, capsys, monkeypatch, grid, command):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    monkeypatch.delitem(sys.modules, "sim_backend.batch", raising=False)
+    argv = [*command, *([str(grid), "--out", str(tmp_path / "out")] if command == ("sweep",) else [])]
+    assert cli.main(argv) == 3
+    err = capsys.readouterr().err
+    assert "numba is not installed" in err
+    assert len(err.strip().splitlines()) == 1
+    with pytest.raises(EnvironmentFault):
+        sweep_items.run_lane_item(sweep_items.cut(load_grid(grid, {}))[0])
 
 
 def test_a_case_beyond_the_range_of_numbers_is_an_error_and_no_nan(tmp_path, capsys):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from robot_io.errors import PushError
+from robot_io.errors import EnvironmentFault, PushError
 from sim_backend.lanes import LaneEnd, LaneResult, Timing
 from tools.study.grid import Case, Study, lane_of
 
@@ -66,11 +66,16 @@ def cut(study: Study) -> list[LaneItem]:
 
 
 def run_lane_item(item: LaneItem) -> Part:
-    """Run an item's lanes; arrays: `states`, shape (cases, records, 6), NaN after a lane's end."""
+    """Run an item's lanes; arrays: `states`, shape (cases, records, 6), NaN after a lane's end.
+
+    Raises EnvironmentFault where numba is missing.
+    """
     import numpy as np
 
     try:
         return _run(item)
+    except EnvironmentFault:
+        raise  # this machine cannot compute anything: no fault of the case, which another may still run
     except PushError as error:
         told = str(error)
     except Exception as error:  # one bad case must not cost the study; its row names the defect
