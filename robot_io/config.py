@@ -109,6 +109,16 @@ class PathConfig(Table, frozen=True):
     """Distance from where the approach starts to where the object is expected."""
 
 
+class SlidersConfig(Table, frozen=True):
+    """What this rig is meant to push, boxes and barrels: `push run` warns of gains with little margin for some."""
+
+    shortest_m: Positive = 0.3
+    """Length along the push, or diameter, of the smallest ..."""
+    longest_m: Positive = 0.5
+    """... and of the largest."""
+    pressure: Literal["uniform", "rim", "point"] = "uniform"
+
+
 class ControlConfig(Table, frozen=True):
     """Gains and speeds of the push."""
 
@@ -157,6 +167,7 @@ class RigConfig(Table, frozen=True):
     arm: ArmConfig = ArmConfig()
     base: BaseConfig = BaseConfig()
     path: PathConfig = PathConfig()
+    sliders: SlidersConfig = SlidersConfig()
     control: ControlConfig = ControlConfig()
     limits: LimitsConfig = LimitsConfig()
     world: WorldConfig = WorldConfig()

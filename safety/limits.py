@@ -53,6 +53,8 @@ def check(rig: RigConfig) -> None:
         problems.append("limits.hold_slow_rad must be below limits.hold_stop_rad")
     if rig.control.force_min_N >= rig.limits.slow_force_N:
         problems.append("control.force_min_N must be below limits.slow_force_N")
+    if rig.sliders.shortest_m > rig.sliders.longest_m:
+        problems.append("sliders.shortest_m must not be above sliders.longest_m")
     if rig.control.approach_speed_m_per_s > speed_limit_m_per_s(rig):
         problems.append(
             "control.approach_speed_m_per_s is above the envelope (limits.envelope_factor x control.push_speed_m_per_s)"

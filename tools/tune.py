@@ -12,11 +12,12 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeVar
 
 from robot_io.error_report import say_json, tell
 from robot_io.errors import UsageError
-from sim_backend.floor import Floor, FloorEffects
+from sim_backend.assumed_sliders import pushed_body, samples
+from sim_backend.floor import FloorEffects
 from sim_backend.gain_limits import (
     PushedBody,
     fast_loop_k_f,
@@ -26,11 +27,12 @@ from sim_backend.gain_limits import (
     offset_per_newton_m,
     sticking_limit,
 )
-from sim_backend.slider import Circle, Rectangle, SliderModel, pressure_distance_m
+from sim_backend.slider import Circle, Pressure, Rectangle
 from tools.study.tune_map import PRESETS
 
-SAMPLES = 5
-"""Sizes and widths taken from a range, its ends among them."""
+Word = TypeVar("Word", bound=str)
+SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
+PRESSURES: tuple[Pressure, ...] = ("uniform", "rim", "point")
 MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
 SHARE = 0.5
 """The recommended k_y is this share of its limit: twice the gain, or half the margin assumed, is still stable."""
@@ -122,29 +124,29 @@ def assumed_bodies(args: argparse.Namespace) -> list[PushedBody]:
     """Return the sliders the arguments assume: the corners of their ranges and some between. Raises UsageError."""
     lengths = _between(args.size_m, "--size-m")
     widths = _between(args.width_m, "--width-m") if args.width_m else None
-    shapes = _words(args.shapes, ("box", "circle"), "--shapes")
-    pressures = _words(args.pressures, ("uniform", "rim", "point"), "--pressures")
+    shapes = _words(args.shapes, SHAPES, "--shapes")
+    pressures = _words(args.pressures, PRESSURES, "--pressures")
     for name in ("ball_radius_m", "push_height_m", "floor_friction"):
         if not 0 <= getattr(args, name) < math.inf:
             raise UsageError("this is not a number of at least 0", where=f"--{name.replace('_', '-')}")
     for name in ("anisotropy", "slide_force_N"):
         if not 0 < getattr(args, name) < math.inf:
             raise UsageError("this is not a positive, finite number", where=f"--{name.replace('_', '-')}")
+    effects = FloorEffects(
+        shift_m=args.floor_friction * args.push_height_m, turning=args.turning, along_over_across=args.anisotropy
+    )
     bodies = []
     for length in lengths:
         outlines: list[Circle | Rectangle] = []
         if "box" in shapes:
             outlines += [Rectangle(length, width) for width in widths or [length]]
         outlines += [Circle(length / 2)] if "circle" in shapes else []
-        bodies += [_body(outline, pressure, length, args) for outline in outlines for pressure in pressures]
+        bodies += [
+            pushed_body(outline, pressure, effects, args.ball_radius_m)
+            for outline in outlines
+            for pressure in pressures
+        ]
     return bodies
-
-
-def _body(outline: Circle | Rectangle, pressure: Any, length: float, args: argparse.Namespace) -> PushedBody:
-    model = SliderModel(outline, 1.0, pressure_distance_m(outline, pressure), 1.0)
-    effects = FloorEffects(shift_m=args.floor_friction * args.push_height_m, turning=args.turning)
-    _, _, d, _, _ = Floor(model, pressure, effects).grip(0.0, 0.0, 1.0, 0.0, 1.0, 0.0)
-    return PushedBody(isinstance(outline, Circle), length / 2, d, args.ball_radius_m, effects.shift_m, args.anisotropy)
 
 
 def check(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
@@ -239,15 +241,15 @@ def _between(text: str, where: str) -> list[float]:
         raise UsageError(
             f"`{text}` is not a range of two positive lengths", where=where, do=f"For example {where}=0.3,0.7"
         )
-    return [low + (high - low) * i / (SAMPLES - 1) for i in range(SAMPLES)] if high > low else [low]
+    return samples(low, high)
 
 
-def _words(text: str, known: tuple[str, ...], where: str) -> list[str]:
-    words = text.split(",")
-    for word in words:
-        if word not in known:
+def _words(text: str, known: tuple[Word, ...], where: str) -> list[Word]:
+    by_name = {str(word): word for word in known}
+    for word in text.split(","):
+        if word not in by_name:
             raise UsageError(f"`{word}` is not one of {', '.join(known)}", where=where)
-    return words
+    return [by_name[word] for word in text.split(",")]
 
 
 def _rounded_down(value: float) -> float:

@@ -109,3 +109,24 @@ def test_run_warns_of_gains_with_little_margin_only():
     assert "\n" not in paper
     assert gain_warning(load_rig("sim", ["control.controller=open-loop", "control.k_y_rad_per_m=2"])) is None
     assert gain_warning(load_rig("sim", ["world.slider.shape=circle", "control.k_y_rad_per_m=1.5"])) is not None
+    assert all(gain_warning(load_rig(name)) is None for name in ("emulated", "barrel", "thing"))
+    assert gain_warning(load_rig("paper-gains")) is not None
+
+
+def test_run_warns_for_the_whole_range_of_sliders_that_the_rig_assumes():
+    """Sticking box of length L, ball R, uniform: k_y < k_f (L/2 - R) / (d^2 + L^2/4), d = 0.3826 L."""
+    limit_1m = 0.3 * (0.5 - 0.05) / (0.382598**2 + 0.25)
+    for share, warned in ((0.68, False), (0.72, True)):
+        settings = [f"control.k_y_rad_per_m={share * limit_1m}", "sliders.longest_m=1.0"]
+        for rig in ("sim", "thing"):
+            assert (gain_warning(load_rig(rig, settings)) is not None) == warned
+            assert gain_warning(load_rig(rig, settings[:1])) is None
+    simulated = gain_warning(load_rig("sim", ["world.slider.length_m=3", "world.slider.width_m=3"]))
+    real = gain_warning(load_rig("thing", ["world.slider.length_m=3", "world.slider.width_m=3"]))
+    assert simulated is not None  # no box of the range, but the one that is there
+    assert real is None
+
+
+def test_a_range_of_sliders_upside_down_is_refused(capsys):
+    assert cli.main(["run", "sim", "--fast", "--set", "sliders.shortest_m=0.6"]) == 2
+    assert "sliders.shortest_m must not be above sliders.longest_m" in capsys.readouterr().err

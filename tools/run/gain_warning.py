@@ -1,36 +1,51 @@
-"""What `push run` says about gains that leave little room, for the slider its rig assumes."""
+"""What `push run` says about gains that leave little room, for the sliders its rig assumes."""
 
 from __future__ import annotations
 
-from msgspec.structs import replace
+from collections.abc import Iterator
 
 from robot_io.config import RigConfig
+from robot_io.errors import ConfigError
+from sim_backend.assumed_sliders import pushed_body, samples
+from sim_backend.floor import FloorEffects
 from sim_backend.gain_limits import WARN_SHARE, PushedBody, limit
-from sim_backend.scene import floor_of, slider_model
+from sim_backend.scene import slider_model
+from sim_backend.slider import Circle, Pressure, Rectangle
+from tools.rig import devices_at
 
 
 def gain_warning(rig: RigConfig) -> str | None:
-    """Return one sentence if a rig's gains are beyond 0.7 of the limit for its `[world.slider]`, else None."""
-    control, slider = rig.control, rig.world.slider
+    """Return one sentence if a rig's gains are beyond 0.7 of the limit for a slider it may meet, else None."""
+    control = rig.control
     if control.controller != "force":
         return None
-    is_round = slider.shape == "circle"
-    even = replace(rig, world=replace(rig.world, floor=replace(rig.world.floor, patch_strength=0.0)))
-    floor = floor_of(even, seed=0)
-    d = slider_model(slider).d_m if floor is None else floor.grip(0.0, 0.0, 1.0, 0.0, 1.0, 0.0)[2]
-    body = PushedBody(
-        is_round,
-        slider.radius_m if is_round else slider.length_m / 2,
-        d,
-        rig.world.ball_radius_m,
-        slider.floor_friction * rig.world.floor.push_height_m,
-        rig.world.floor.along_over_across,
-    )
-    highest = limit([body], control.k_f)
+    highest = limit(_bodies(rig), control.k_f)
     if control.k_y_rad_per_m <= WARN_SHARE * highest:
         return None
     told = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
     return (
-        f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may weave: for the slider of [world.slider] at this k_f "
+        f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may weave: for the sliders of this rig at this k_f "
         f"{told}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds others"
     )
+
+
+def _bodies(rig: RigConfig) -> Iterator[PushedBody]:
+    """Give the sliders of `[sliders]`, and the simulated one where there is one."""
+    world = rig.world
+    effects = FloorEffects(
+        shift_m=world.slider.floor_friction * world.floor.push_height_m,
+        turning=world.floor.turning,
+        along_over_across=world.floor.along_over_across,
+    )
+    assumed: list[tuple[Circle | Rectangle, Pressure]] = []
+    for length in samples(rig.sliders.shortest_m, rig.sliders.longest_m):
+        assumed += [(Rectangle(length, length), rig.sliders.pressure), (Circle(length / 2), rig.sliders.pressure)]
+    if not devices_at(rig, "hardware"):
+        shape = slider_model(world.slider).shape
+        assert isinstance(shape, Circle | Rectangle)
+        assumed.append((shape, world.slider.pressure))
+    for outline, pressure in assumed:
+        try:
+            yield pushed_body(outline, pressure, effects, world.ball_radius_m)
+        except ConfigError:  # it would tip over: nobody pushes that one so high
+            continue
