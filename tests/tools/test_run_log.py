@@ -22,8 +22,8 @@ STATE = STATE_CDR.encode(
 SEEN = POSE_STAMPED.encode(PoseStamped(Header(ros_time(0), "world"), planar_pose(7.0, 8.0, 0.0)))
 
 
-def write(path: Path, *overrides: str) -> dict[str, list[bytes]]:
-    config = rig_to_toml(load_rig("emulated", overrides))
+def write(path: Path, *overrides: str, rig: str = "emulated") -> dict[str, list[bytes]]:
+    config = rig_to_toml(load_rig(rig, overrides))
     log = RunLog(path, config_text=config, metadata={"seed": "1"}, wall_offset_ns=10**18)
     for n in range(20):
         log.record(Kind.WORLD_STATE, n * 10_000_000, STATE)
@@ -41,9 +41,10 @@ def test_the_same_records_give_the_same_bytes(tmp_path):
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
+@pytest.mark.parametrize("rig", ["emulated", "sim"])
 @pytest.mark.parametrize(("topic", "x"), [("/vicon/slider/slider", 7.0), ("", 1.0)])
-def test_the_slider_is_where_it_was_seen_and_without_cameras_where_the_world_says(tmp_path, topic, x):
-    payloads = write(tmp_path / "run.mcap", f'base.topics.slider_pose="{topic}"')
+def test_the_slider_is_where_it_was_seen_and_without_cameras_where_the_world_says(tmp_path, topic, x, rig):
+    payloads = write(tmp_path / "run.mcap", f'base.topics.slider_pose="{topic}"', rig=rig)
     transforms = [TF_MESSAGE.decode(payload).transforms[0] for payload in payloads["/tf"]]
     assert len(transforms) == 20
     assert {(t.child_frame_id, t.transform.translation.x) for t in transforms} == {("slider", x)}

@@ -39,7 +39,7 @@ class RunLog:
         self._scene_written = False
         self._topics = TickTopics(wall_offset_ns)
         # With motion capture of the object its pose is what was seen, else it is the world's truth.
-        self._slider_is_seen = bool(rig.base.topics.slider_pose) and rig.base.level != "sim"
+        self._slider_is_seen = bool(rig.base.topics.slider_pose)
         self._seal = LogSeal()
         self.chain = TickChain()
         self.undecodable = 0
