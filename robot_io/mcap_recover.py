@@ -8,8 +8,8 @@ from typing import NamedTuple
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
 from robot_io.errors import LogDamaged, UsageError
-from robot_io.log_seal import LogSeal
-from robot_io.mcap_log import LIBRARY, PROFILE, create_new, finish_writer
+from robot_io.log_seal import LogSeal, config_seal
+from robot_io.mcap_log import CONFIG_ATTACHMENT, LIBRARY, PROFILE, create_new, finish_writer
 from robot_io.mcap_walk import LogItem, walk
 from robot_io.mcap_writer import McapWriter
 
@@ -47,7 +47,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
         if copy.seal.messages == 0:
             raise LogDamaged(f"no message can be saved: {cause}", where=str(path))
         copy.writer.flush()
-        facts = {"source": path.name, "cause": cause, **copy.seal.facts()}
+        facts = {"source": path.name, "cause": cause, **copy.seal.facts(), **config_seal(copy.config)}
         copy.writer.add_metadata(RECOVERED_METADATA, facts)
         finish_writer(copy.writer, stream)
     except BaseException:
@@ -63,7 +63,9 @@ class _Copy:
     def __init__(self, writer: McapWriter) -> None:
         self.writer = writer
         self.seal = LogSeal()
+        self.config = b""
         self._topics: dict[int, str] = {}
+        self._types: dict[int, Schema] = {}
         self._schemas: dict[int, int] = {}
         self._channels: dict[int, int] = {}
 
@@ -72,16 +74,21 @@ class _Copy:
         if isinstance(item, Message):
             channel_id = self._channels[item.channel_id]
             self.writer.add_message(channel_id, item.log_time, item.data, item.publish_time, item.sequence)
-            self.seal.note(self._topics[item.channel_id], item.data)
+            self.seal.note(self._topics[item.channel_id], item.log_time, item.data)
         elif isinstance(item, Schema):
+            self._types[item.id] = item
             self._schemas[item.id] = self.writer.register_schema(item.name, item.encoding, item.data)
         elif isinstance(item, Channel):
             self._topics[item.id] = item.topic
+            schema = self._types[item.schema_id]
+            self.seal.declare(item.topic, schema.name, schema.data)
             schema_id = self._schemas[item.schema_id]
             self._channels[item.id] = self.writer.register_channel(
                 item.topic, item.message_encoding, schema_id, item.metadata
             )
         elif isinstance(item, Attachment):
             self.writer.add_attachment(item.create_time, item.log_time, item.name, item.media_type, item.data)
+            if item.name == CONFIG_ATTACHMENT:
+                self.config = item.data
         elif isinstance(item, Metadata):
             self.writer.add_metadata(item.name, item.metadata)

@@ -94,6 +94,7 @@ def machine_differences(facts: dict[str, str]) -> list[str]:
 def what_if(path: Path, args: argparse.Namespace) -> int:
     """Fold the log's inputs with other settings and say what the law would have commanded."""
     log = VerifiedLog(path)
+    log.require_config()
     other = rig_from_toml(rig_to_toml(log.rig), overrides=args.what_if)
     core = TickCore.of(other, in_contact=log.in_contact)
     state = None

@@ -46,6 +46,7 @@ def rewritten(
     *,
     config: Callable[[str], str] = lambda text: text,
     metadata: Callable[[str, dict[str, str]], dict[str, str] | None] = lambda name, values: values,
+    schema: Callable[[str], str] = lambda text: text,
 ) -> Path:
     """Write the log again with the `mcap` library alone: messages edited, checksums of the file right."""
     schemas: dict[int, Schema] = {}
@@ -68,7 +69,9 @@ def rewritten(
     with out.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
         writer.start("ros2", "another-tool")
-        new_schema = {n: writer.register_schema(s.name, s.encoding, s.data) for n, s in schemas.items()}
+        new_schema = {
+            n: writer.register_schema(s.name, s.encoding, schema(s.data.decode()).encode()) for n, s in schemas.items()
+        }
         new_channel = {
             n: writer.register_channel(c.topic, c.message_encoding, new_schema[c.schema_id], c.metadata)
             for n, c in channels.items()

@@ -12,10 +12,11 @@ from msgspec.structs import replace
 
 from robot_io.errors import LogDamaged
 from robot_io.log_seal import LogSeal
+from robot_io.mcap_read import LogSummary, read_summary
 from robot_io.messages import BodyTwist, LinkState, Pose2D, WorldTwist
 from robot_io.tick import ControlTick, Operator
 from robot_io.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
-from tests.replay.runs import Messages, changed, places, replayed, rewritten, with_input
+from tests.replay.runs import Messages, changed, places, replayed, rewritten, with_data, with_input
 from tools.cli import main
 from tools.replay import verified_log
 from tools.replay.fold import replay
@@ -249,11 +250,13 @@ def test_a_changed_record_of_the_world_does_not_pass(name, sim_log, tmp_path, ca
     assert replayed(capsys, log)[0] in (DIFFERS, DAMAGED)
 
 
-def resealed(messages: Messages):
+def resealed(summary: LogSummary, messages: Messages):
     """Return the metadata editor of a forger who mends the seal as well."""
     seal = LogSeal()
+    for channel in summary.channels:
+        seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
     for topic, message in messages:
-        seal.note(topic, message.data)
+        seal.note(topic, message.log_time, message.data)
     return lambda name, values: {**values, **seal.facts()} if name == "run_end" else values
 
 
@@ -266,11 +269,14 @@ def test_whoever_mends_the_seal_too_is_found_by_the_world_itself(name, sim_log, 
         kept.extend(changed(topic, index, change)(messages))
         return kept
 
-    log = rewritten(sim_log, tmp_path / "run.mcap", edit, metadata=lambda name, values: resealed(kept)(name, values))
+    summary = read_summary(sim_log)
+    out = tmp_path / "run.mcap"
+    log = rewritten(sim_log, out, edit, metadata=lambda name, values: resealed(summary, kept)(name, values))
     code, told = replayed(capsys, log)
     assert code == DIFFERS
     assert told["first_difference"] is None
     assert told["world"]["first_difference"]["field"]
+    assert not told["notes"]
 
 
 @pytest.mark.parametrize("topic", ["/world/state", "/world/command", "/world/start", "/gate/sent", "/ft/wrench_raw"])
@@ -285,6 +291,56 @@ def test_a_removed_record_of_any_topic_does_not_pass(topic, sim_log, tmp_path, c
 def test_a_changed_plot_topic_does_not_pass(sim_log, tmp_path, capsys):
     edit = changed("/ft/wrench", 50, lambda data: flipped(data, 30, 1))
     assert replayed(capsys, rewritten(sim_log, tmp_path / "run.mcap", edit))[0] == DAMAGED
+
+
+def at_another_time(messages: Messages, at: list[int]) -> Messages:
+    m = messages[at[1]][1]
+    moved = type(m)(m.channel_id, m.log_time + 1, m.data, m.publish_time, m.sequence)
+    return [*messages[: at[1]], (messages[at[1]][0], moved), *messages[at[1] + 1 :]]
+
+
+def payloads_exchanged(messages: Messages, at: list[int]) -> Messages:
+    result = list(messages)
+    (topic, first), (_, second) = result[at[50]], result[at[51]]
+    assert first.data != second.data
+    result[at[50]], result[at[51]] = (topic, with_data(first, second.data)), (topic, with_data(second, first.data))
+    return result
+
+
+@pytest.mark.parametrize("topic", ["/ft/wrench_raw", "/gate/sent", "/base/odom", "/world/state"])
+@pytest.mark.parametrize("edit", [at_another_time, payloads_exchanged])
+def test_what_was_at_one_time_cannot_be_moved_to_another(edit, topic, sim_log, tmp_path, capsys):
+    log = rewritten(sim_log, tmp_path / "run.mcap", lambda messages: edit(messages, places(messages, topic)))
+    assert replayed(capsys, log)[0] in (DIFFERS, DAMAGED)
+
+
+IDLE_SETTINGS = {
+    "gain that had nothing to do": ("heading_gain_per_s = 1.0", "heading_gain_per_s = 1.01"),
+    "limit that was not reached": ("max_force_N = 150.0", "max_force_N = 149.0"),
+    "threshold": ("force_min_N = 5.0", "force_min_N = 5.01"),
+    "noise": ("noise_torque_Nm = 0.03", "noise_torque_Nm = 0.04"),
+    "name": ('name = "sim"', 'name = "sim2"'),
+}
+
+
+@pytest.mark.parametrize("name", IDLE_SETTINGS)
+def test_a_changed_setting_that_changes_no_tick_is_an_altered_log(name, sim_log, tmp_path, capsys):
+    old, new = IDLE_SETTINGS[name]
+    assert old in read_summary(sim_log).attachments["config.toml"].decode()
+    log = rewritten(sim_log, tmp_path / "run.mcap", config=lambda text: text.replace(old, new))
+    for more in ((), ("--what-if", "control.k_f=0.31")):
+        code, told = replayed(capsys, log, *more)
+        assert code == DAMAGED
+        assert "config.toml" in told["error"]["what"]
+
+
+def test_a_changed_definition_of_a_type_is_an_altered_log(sim_log, tmp_path, capsys):
+    """Readers would show the force as the torque."""
+
+    def other(text: str) -> str:
+        return text.replace("Vector3 force", "Vector3 other").replace("Vector3 torque", "Vector3 force")
+
+    assert replayed(capsys, rewritten(sim_log, tmp_path / "run.mcap", schema=other))[0] == DAMAGED
 
 
 @pytest.mark.parametrize("lost", ["run_end", "run"])

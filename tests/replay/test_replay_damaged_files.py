@@ -150,7 +150,7 @@ def test_a_log_cut_in_its_summary_only_is_complete_again(sim_log, tmp_path, caps
     assert (code, told["complete"], told["notes"]) == (0, True, [])
 
 
-@pytest.mark.parametrize("how", ["changed", "last tick gone", "state gone", "seal gone"])
+@pytest.mark.parametrize("how", ["changed", "last tick gone", "state gone", "seal gone", "limit changed"])
 def test_a_rescued_log_that_was_altered_later_does_not_pass(how, sim_log, tmp_path, capsys):
     cut, saved, out = (tmp_path / name for name in ("cut.mcap", "saved.mcap", "out.mcap"))
     data = sim_log.read_bytes()
@@ -158,6 +158,8 @@ def test_a_rescued_log_that_was_altered_later_does_not_pass(how, sim_log, tmp_pa
     assert main(["log", "recover", str(cut), "--out", str(saved)]) == 0
     if how == "seal gone":
         rewritten(saved, out, metadata=lambda name, values: None if name == "recovered" else values)
+    elif how == "limit changed":
+        rewritten(saved, out, config=lambda text: text.replace("max_force_N = 150.0", "max_force_N = 149.0"))
     elif how == "changed":  # the last tick: no later one would tell
         rewritten(saved, out, changed("/control/tick", -1, lambda d: d[:-1] + bytes((d[-1] ^ 1,))))
     else:

@@ -11,7 +11,7 @@ from pathlib import Path
 from robot_io.config import rig_from_toml
 from robot_io.errors import LogDamaged
 from robot_io.log_channels import BY_TOPIC, CHANNELS, Kind
-from robot_io.log_seal import LogSeal
+from robot_io.log_seal import LogSeal, config_seal
 from robot_io.mcap_log import McapLog
 from robot_io.ros_messages import POSE_STAMPED, planar_pose
 from robot_io.tick import TICK_CDR, ControlTick
@@ -34,6 +34,7 @@ class RunLog:
         rig = rig_from_toml(config_text)
         self._offset_ns = wall_offset_ns
         self._log = McapLog(path, config_text=config_text, metadata={**metadata, OFFSET_FACT: str(wall_offset_ns)})
+        self._config_seal = config_seal(config_text.encode())
         self._declared: set[str] = set()
         self._rig = rig
         self._scene_written = False
@@ -82,6 +83,7 @@ class RunLog:
         """Close the log with the facts known only now; idempotent."""
         own = {
             **self._seal.facts(),
+            **self._config_seal,
             "ticks": str(self.chain.ticks),
             "last_tick_crc32": f"{self.chain.crc32:08x}",
             "undecodable": str(self.undecodable),
@@ -102,7 +104,8 @@ class RunLog:
             self._declared.add(message.topic)
             channel = BY_TOPIC[message.topic]
             self._log.channel(channel.topic, channel.cdr_type, latched=channel.latched)
-        self._seal.note(message.topic, message.payload)
+            self._seal.declare(channel.topic, channel.cdr_type.name, channel.cdr_type.schema_text.encode())
+        self._seal.note(message.topic, message.log_time_ns, message.payload)
         self._log.write(message.topic, message.log_time_ns, message.payload)
 
     def _slider(self, kind: int, time_ns: int, payload: bytes) -> None:

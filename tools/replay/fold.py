@@ -52,12 +52,17 @@ def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
     notes = []
     if not log.complete:
         notes.append(f"the log was recovered: it ends with tick {ticks.last}, what came after is lost")
+    if not log.config_holds:
+        notes.append("the log's config.toml was changed after it was finished")
     if ran is None and level_of(log.rig) != "hardware":
         why = "records of it did not fit into the log's ring" if world is None else "its start is missing"
         notes.append(f"the world was not compared: {why}")
-    return ReplayResult(
+    result = ReplayResult(
         ticks.count, ticks.identical, ticks.gaps, ticks.first, ran, log.complete, tuple(notes), log.facts
     )
+    if not result.different:  # otherwise what differs says more than that something was changed
+        log.require_config()
+    return result
 
 
 class TickReplayer:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from robot_io.config import RigConfig, rig_from_toml
 from robot_io.errors import LogDamaged, PushError
-from robot_io.log_seal import LogSeal
+from robot_io.log_seal import CONFIG_FACT, LogSeal, config_seal
 from robot_io.mcap_log import CONFIG_ATTACHMENT, END_METADATA, RUN_METADATA
 from robot_io.mcap_read import LogMessage, read_log, read_summary
 from robot_io.mcap_recover import RECOVERED_METADATA
@@ -45,8 +45,13 @@ class VerifiedLog:
         except (KeyError, UnicodeDecodeError, RecursionError, PushError) as error:
             why = "it is missing" if isinstance(error, KeyError) else str(error).splitlines()[0]
             raise self._damaged(f"the log holds no usable {CONFIG_ATTACHMENT}: {why}") from None
-        if self._end is None and self._saved is None:
+        end = self._end if self._end is not None else self._saved
+        if end is None:
             raise self._damaged("the log does not say how it ends")
+        seal = config_seal(summary.attachments[CONFIG_ATTACHMENT])
+        self.config_holds = end.get(CONFIG_FACT) == seal[CONFIG_FACT]
+        """Whether config.toml is the one that the log was finished with."""
+        self._channels = summary.channels
 
     @property
     def complete(self) -> bool:
@@ -65,9 +70,11 @@ class VerifiedLog:
     def messages(self) -> Iterator[Item]:
         """Yield every message in the order of the file. Take all before trusting any: the end may raise LogDamaged."""
         chain, seal = TickChain(), LogSeal()
+        for channel in self._channels:
+            seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
         last = -1
         for message in read_log(self.path):
-            seal.note(message.topic, message.payload)
+            seal.note(message.topic, message.log_time_ns, message.payload)
             tick = None
             if message.topic == TICK_TOPIC:
                 tick = self._tick(message, last, chain.holds(message.payload))
@@ -98,9 +105,14 @@ class VerifiedLog:
                 raise self._damaged(f"tick {last}, the last one, was altered or ticks are missing")
         if any(wanted.get(name) != value for name, value in seal.facts().items()):
             raise self._damaged(
-                f"messages were changed, lost or added after it was finished "
+                f"messages or their types were changed, lost or added after it was finished "
                 f"({seal.messages} are there, {wanted.get('messages', 'an unknown number')} were written)"
             )
+
+    def require_config(self) -> None:
+        """Raise LogDamaged unless `config_holds`."""
+        if not self.config_holds:
+            raise self._damaged(f"its {CONFIG_ATTACHMENT} was changed after it was finished")
 
     def _damaged(self, what: str) -> LogDamaged:
         return LogDamaged(what, where=str(self.path), do=DO_DAMAGED)
