@@ -47,8 +47,12 @@ def rewritten(
     config: Callable[[str], str] = lambda text: text,
     metadata: Callable[[str, dict[str, str]], dict[str, str] | None] = lambda name, values: values,
     schema: Callable[[str], str] = lambda text: text,
+    data_crc: bool = True,
 ) -> Path:
-    """Write the log again with the `mcap` library alone: messages edited, checksums of the file right."""
+    """Write the log again with the `mcap` library alone: messages edited, checksums of the file right.
+
+    data_crc: whether its data as a whole get one too; the library's default is not.
+    """
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     messages: Messages = []
@@ -67,7 +71,7 @@ def rewritten(
             elif isinstance(record, Attachment):
                 attachments.append(record)
     with out.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
+        writer = Writer(stream, compression=CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=data_crc)
         writer.start("ros2", "another-tool")
         new_schema = {
             n: writer.register_schema(s.name, s.encoding, schema(s.data.decode()).encode()) for n, s in schemas.items()

@@ -347,3 +347,13 @@ def test_a_changed_definition_of_a_type_is_an_altered_log(sim_log, tmp_path, cap
 def test_a_log_without_its_facts_does_not_pass(lost, sim_log, tmp_path, capsys):
     log = rewritten(sim_log, tmp_path / "run.mcap", metadata=lambda name, values: None if name == lost else values)
     assert replayed(capsys, log)[0] == DAMAGED
+
+
+def test_a_log_written_again_as_the_library_does_by_default_replays_and_a_change_is_found(sim_log, tmp_path, capsys):
+    out = tmp_path / "run.mcap"
+    assert replayed(capsys, rewritten(sim_log, out, data_crc=False))[0] == 0
+    for topic in ("/control/tick", "/ft/wrench_raw"):
+        edit = changed(topic, 7, lambda data: flipped(data, len(data) // 2, 1))
+        assert replayed(capsys, rewritten(sim_log, out, edit, data_crc=False))[0] == DAMAGED
+    log = rewritten(sim_log, out, config=lambda text: text.replace("k_f = 0.3", "k_f = 0.31"), data_crc=False)
+    assert replayed(capsys, log)[0] == DIFFERS
