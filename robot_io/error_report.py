@@ -20,6 +20,11 @@ def tell(text: str) -> None:
             print(text, file=sys.stderr, flush=True)
 
 
+def printable(text: str) -> str:
+    """Return text that may come out of a file or a log without what a terminal would act on; lines stay lines."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in text)
+
+
 def say_json(value: object) -> None:
     """Print `value` as one line of JSON on stdout, flushed; ValueError for a number that is not finite."""
     if sys.stdout is not None:
@@ -28,7 +33,7 @@ def say_json(value: object) -> None:
 
 def report(error: PushError, *, as_json: bool) -> int:
     """Tell about `error` in one sentence, with `--json` also as the last line of stdout; return the exit code."""
-    tell(f"push: {error}")
+    tell(printable(f"push: {error}"))
     if as_json:
         say_json({"schema": SCHEMA, "error": error.as_json()})
     return error.exit_code

@@ -17,15 +17,22 @@ KeyPath = tuple[str, ...]
 Origins = dict[KeyPath, str]
 """Where each key was written: `file:line`, or `--set key`."""
 
-_HEADER = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]\s*(?:#.*)?$")
-_KEY = re.compile(r"^\s*([A-Za-z0-9_.\-\"' ]+?)\s*=")
+_MOST_CHARACTERS = 64 << 10
+_MOST_DOTS = 200
+"""In a line. `tomllib` takes memory by the square of a key's parts, and the text may come out of a log."""
+_HEADER = re.compile(r"\[([^\[\]]+)\]\s*(?:#.*)?\Z")
+_KEY = re.compile(r"([A-Za-z0-9_.\-\"' \t]+)=")
 
 
 def parse(text: str, name: str) -> tuple[dict[str, Any], Origins]:
     """Return the tables of `text` and the origin (`name:line`) of each key; ConfigError when it is not TOML."""
+    if len(text) > _MOST_CHARACTERS:
+        raise ConfigError(f"{len(text)} characters are too many for a rig", where=name)
+    if any(line.count(".") > _MOST_DOTS for line in text.splitlines()):
+        raise ConfigError("this is nested too deep to be a rig", where=name)
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # a TOMLDecodeError, or an integer of thousands of digits
         # The message ends in "(at line 3, column 7)"; the place goes in front, as everywhere else.
         place = re.search(r" \(at line (\d+), column \d+\)$", str(error))
         line = int(place[1]) if place else text.count("\n") + 1
@@ -40,6 +47,7 @@ def _origins(text: str, name: str) -> Origins:
     origins: Origins = {}
     table: KeyPath = ()
     for number, line in enumerate(text.splitlines(), start=1):
+        line = line.strip()
         if header := _HEADER.match(line):
             table = _split(header[1])
             origins.setdefault(table, f"{name}:{number}")
@@ -49,7 +57,7 @@ def _origins(text: str, name: str) -> Origins:
 
 
 def _split(dotted: str) -> KeyPath:
-    return tuple(part.strip(" \"'") for part in dotted.split("."))
+    return tuple(part.strip(" \t\"'") for part in dotted.split("."))
 
 
 def parse_setting(setting: str) -> tuple[KeyPath, Any]:
@@ -63,7 +71,7 @@ def parse_setting(setting: str) -> tuple[KeyPath, Any]:
     text = text.strip()
     try:
         parsed = tomllib.loads(f"value = {text}")
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return path, text
     return path, parsed["value"] if len(parsed) == 1 else text
 

@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from robot_io.clock import NS_PER_S
-from robot_io.error_report import SCHEMA, say_json, tell
+from robot_io.error_report import SCHEMA, printable, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.mcap_read import LogSummary, read_summary
 from robot_io.mcap_recover import recover
@@ -76,7 +76,7 @@ def _table(path: Path, summary: LogSummary, duration_s: float) -> str:
     for name, values in summary.metadata.items():
         lines += [f"{name}:", *(f"  {key} = {value}" for key, value in values.items())]
     lines += [f"attached: {name}, {len(data)} bytes" for name, data in summary.attachments.items()]
-    return "\n".join(map(_printable, lines))
+    return printable("\n".join(lines))
 
 
 def _cat(args: argparse.Namespace) -> dict[str, Any]:
@@ -134,10 +134,5 @@ def _recover(args: argparse.Namespace) -> dict[str, Any]:
 
 def _told(decoders: Decoders) -> dict[str, str]:
     for topic, why in decoders.unreadable.items():
-        tell(_printable(f"{topic} left out: {why}"))
+        tell(printable(f"{topic} left out: {why}"))
     return decoders.unreadable
-
-
-def _printable(text: str) -> str:
-    """Return text of a log without what a terminal would act on."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_io.config import rig_from_toml, rig_to_toml
-from robot_io.error_report import say_json, tell
+from robot_io.error_report import printable, say_json, tell
 from robot_io.errors import ReplayDiffers, UsageError
 from tools.log.find import find_log
 from tools.replay.difference import Difference
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
             show(f"first difference: {name} {found.tick}, {found.field}: {values}")
     if result.different:
         for line in machine_differences(result.facts):
-            show(line)
+            show(printable(line))
     if args.json:
         say_json(as_json(result))
     return DIFFERS if result.different else 0

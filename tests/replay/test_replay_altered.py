@@ -228,6 +228,9 @@ def one_ulp(value: float) -> float:
 WORLD = {
     "seed": ("/world/start", 0, lambda data: START_CDR.encode(replace(START_CDR.decode(data), seed=7))),
     "start": ("/world/start", 0, lambda data: START_CDR.encode(replace(START_CDR.decode(data), start_ns=0))),
+    "start at the end of times": (
+        "/world/start", 0, lambda data: START_CDR.encode(replace(START_CDR.decode(data), start_ns=2**63 - 1)),
+    ),
     "first state": ("/world/state", 0, lambda data: flipped(data, 20, 1)),
     "a state's force": (
         "/world/state", 250, lambda d: STATE_CDR.encode(replace(s := STATE_CDR.decode(d), force_x=one_ulp(s.force_x))),
@@ -260,7 +263,10 @@ def resealed(summary: LogSummary, messages: Messages):
     return lambda name, values: {**values, **seal.facts()} if name == "run_end" else values
 
 
-@pytest.mark.parametrize("name", ["a state's force", "a command", "a state's endless time", "start", "last state"])
+@pytest.mark.parametrize(
+    "name",
+    ["a state's force", "a command", "a state's endless time", "start", "start at the end of times", "last state"],
+)
 def test_whoever_mends_the_seal_too_is_found_by_the_world_itself(name, sim_log, tmp_path, capsys):
     topic, index, change = WORLD[name]
     kept: Messages = []

@@ -120,6 +120,32 @@ def test_broken_toml_names_file_and_line(tmp_path):
     assert caught.value.where == f"{path}:2"
 
 
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("k_f = " + "1" * 5000, "not TOML"),
+        ("loop.rate_hz = 0x" + "f" * 5000, "out of range"),
+        (".".join("a" * 20_000) + " = 1", "nested too deep"),
+        ("\n".join(f"k{i} = 1" for i in range(20_000)), "too many for a rig"),
+        ('description = """\n' + " " * 60_000 + '\n"""', "`name` is missing"),
+        ('description = """\n[' + " " * 60_000 + '\n"""', "`name` is missing"),
+    ],
+)
+def test_a_hostile_text_is_a_sentence_in_little_time(text, words):
+    """A rig may come out of a log, which is untrusted: squares and cubes of its length must not be computed."""
+    with pytest.raises(ConfigError) as caught:
+        rig_from_toml(text)
+    assert words in str(caught.value)
+
+
+def test_the_line_of_a_key_is_found_however_it_is_spaced():
+    text = '  [ base . topics ]  # here\n\tcommand\t= "/a"\n"status"="/b"\n'
+    origins = toml_text.parse(text, "rig")[1]
+    lines = {("base", "topics"): 1, ("base", "topics", "command"): 2, ("base", "topics", "status"): 3}
+    assert origins == {key: f"rig:{line}" for key, line in lines.items()}
+
+
 def test_overrides_take_toml_values_minus_and_bare_words():
     rig = load_rig(
         "emulated",

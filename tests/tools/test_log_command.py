@@ -148,6 +148,22 @@ def test_a_flipped_bit_is_exit_8(log, tmp_path, capsys):
     assert "damaged" in last_json(capsys)["error"]["what"]
 
 
+@pytest.mark.parametrize("command", [["replay"], ["log", "info"]])
+def test_what_a_log_says_never_reaches_the_terminal_as_a_command(command, tmp_path, capsys):
+    path = tmp_path / "run.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, enable_data_crcs=True)
+        writer.start("ros2", "other")
+        writer.add_attachment(0, 0, "config.toml", "application/toml", b'["\\u001b[2J"]\nx = 1\n')
+        writer.register_channel("/a\x1b[2J", "json", 0)
+        writer.add_metadata("run\x1b[2J", {"\x1b[2J": "\x1b[2J"})
+        writer.finish()
+    main([*command, str(path)])
+    out, err = capsys.readouterr()
+    assert out + err
+    assert "\x1b" not in out + err
+
+
 def test_missing_file_and_missing_action_are_exit_2(tmp_path, capsys):
     assert main(["log", "info", str(tmp_path / "none.mcap"), "--json"]) == 2
     assert last_json(capsys)["error"]["where"].endswith("none.mcap")
