@@ -7,6 +7,7 @@ entries with a space. `--json` promises exactly one object, on one line, last on
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import os
 import select
@@ -16,7 +17,7 @@ from types import ModuleType
 from typing import NamedTuple, NoReturn
 
 from robot_io.error_report import report, unexpected
-from robot_io.errors import OperatorStop, PushError, UsageError
+from robot_io.errors import EnvironmentFault, OperatorStop, PushError, UsageError
 
 BROKEN_PIPE = 141
 """128 + SIGPIPE: whoever read our output has gone (`push log cat LOG | head`)."""
@@ -102,9 +103,13 @@ def main(argv: Sequence[str]) -> int:
         return report(OperatorStop("stopped by the operator"), as_json=as_json)
     except Exception as error:
         if isinstance(error, BrokenPipeError) and _reader_of_stdout_is_gone():
-            # Python flushes stdout once more at exit; give that flush somewhere to go.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            _turn_stdout_away()
             return BROKEN_PIPE
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+            if error.filename is None:  # a descriptor: stdout in all likelihood, which then takes no JSON either
+                _turn_stdout_away()
+            full = EnvironmentFault("there is no room left to write to", where=str(error.filename or "stdout"))
+            return report(full, as_json=as_json)
         return report(unexpected(error), as_json=as_json)
     return code
 
@@ -172,6 +177,11 @@ def keep_standard_descriptors() -> None:
             os.fstat(fd)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is fd
+
+
+def _turn_stdout_away() -> None:
+    """Let all further output vanish: Python flushes stdout once more at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _reader_of_stdout_is_gone() -> bool:

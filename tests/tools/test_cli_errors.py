@@ -201,6 +201,17 @@ def test_reader_that_goes_away_is_no_error(fake):
         assert child.wait(timeout=30) == cli.BROKEN_PIPE
 
 
+@pytest.mark.parametrize("words", [["config", "show", "sim"], ["config", "check", "sim", "--json"]])
+def test_output_to_a_full_disk_is_one_sentence(words):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*PUSH, *words], cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, timeout=30, check=False
+        )
+    assert done.returncode == 3
+    assert done.stderr.splitlines()[-1] == "push: stdout: there is no room left to write to"
+    assert "Traceback" not in done.stderr
+
+
 def test_closed_descriptors_are_filled_before_anything_opens():
     code = (
         "import os\nfor fd in (0, 1, 2): os.close(fd)\n"
