@@ -35,7 +35,8 @@ def report(error: PushError, *, as_json: bool) -> int:
     """Tell about `error` in one sentence, with `--json` also as the last line of stdout; return the exit code."""
     tell(printable(f"push: {error}"))
     if as_json:
-        say_json({"schema": SCHEMA, "error": error.as_json()})
+        with contextlib.suppress(OSError):  # the error may be that stdout takes nothing
+            say_json({"schema": SCHEMA, "error": error.as_json()})
     return error.exit_code
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
-from robot_io.errors import LogDamaged, UsageError
+from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
 from robot_io.log_seal import LogSeal, config_seal
 from robot_io.mcap_log import CONFIG_ATTACHMENT, LIBRARY, PROFILE, create_new, finish_writer
 from robot_io.mcap_walk import LogItem, walk
@@ -26,7 +27,8 @@ class Recovered(NamedTuple):
 def recover(path: Path, out_path: Path) -> Recovered:
     """Copy everything before the first damage of `path` into a new, finished log.
 
-    Raises UsageError when `out_path` exists or `path` is whole, LogDamaged when nothing can be saved.
+    Raises UsageError when `out_path` exists or `path` is whole, LogDamaged when nothing can be saved,
+    EnvironmentFault when the disk does not take it.
     """
     if out_path.exists():
         raise UsageError("there is already a file of this name", where=str(out_path), do="Give another name with --out")
@@ -50,9 +52,16 @@ def recover(path: Path, out_path: Path) -> Recovered:
         facts = {"source": path.name, "cause": cause, **copy.seal.facts(), **config_seal(copy.config)}
         copy.writer.add_metadata(RECOVERED_METADATA, facts)
         finish_writer(copy.writer, stream)
-    except BaseException:
-        stream.close()
+    except BaseException as error:
+        with suppress(OSError):  # it flushes, onto a disk that may be full
+            stream.close()
         out_path.unlink()
+        if isinstance(error, OSError):
+            raise EnvironmentFault(
+                f"the log cannot be written: {error.strerror}",
+                where=str(out_path),
+                do="Make room, or give another --out",
+            ) from None
         raise
     return Recovered(copy.seal.messages, cause)
 

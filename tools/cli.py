@@ -106,10 +106,13 @@ def main(argv: Sequence[str]) -> int:
             _turn_stdout_away()
             return BROKEN_PIPE
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:
-            if error.filename is None:  # a descriptor: stdout in all likelihood, which then takes no JSON either
+            where = str(error.filename or "")  # none: where the output goes
+            code = report(EnvironmentFault("there is no room left on the disk", where=where), as_json=as_json)
+            try:
+                sys.stdout.flush()
+            except OSError:
                 _turn_stdout_away()
-            full = EnvironmentFault("there is no room left to write to", where=str(error.filename or "stdout"))
-            return report(full, as_json=as_json)
+            return code
         return report(unexpected(error), as_json=as_json)
     return code
 

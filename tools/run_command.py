@@ -173,9 +173,15 @@ def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTa
                 live.show(status_line(inp, state, output))
 
     try:
-        figures = one.run(on_tick)
-    finally:
-        log.finish({})
+        try:
+            figures = one.run(on_tick)
+        finally:
+            log.finish({})
+    except OSError as error:  # nothing but the log is outside of this process here
+        log.abandon()
+        raise EnvironmentFault(
+            f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Make room there"
+        ) from None
     live.end()
     keep_tare(rig, figures)
     return verdict.summary(

@@ -325,3 +325,19 @@ def test_a_killed_writer_loses_only_what_was_not_flushed(tmp_path):
     messages = list(read_log(tmp_path / "out.mcap"))
     assert [ros.STRING.decode(m.payload).data for m in messages] == [str(n) for n in range(recovered.messages)]
     assert recovered.messages >= max(flushed, default=3000) >= 3000
+
+
+def test_a_full_disk_while_recovering_is_a_sentence_and_leaves_nothing(tmp_path):
+    write_some(tmp_path / "cut.mcap", finish=False)
+    code = (
+        "import resource, sys, pathlib\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000))\n"
+        "from robot_io.mcap_recover import recover\n"
+        "from robot_io.errors import EnvironmentFault\n"
+        "try: recover(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]))\n"
+        "except EnvironmentFault as fault: print(fault)\n"
+    )
+    words = [sys.executable, "-c", code, str(tmp_path / "cut.mcap"), str(tmp_path / "out.mcap")]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=30, check=True)
+    assert "File too large" in done.stdout
+    assert not (tmp_path / "out.mcap").exists()

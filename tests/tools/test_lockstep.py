@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import struct
 import subprocess
@@ -144,3 +145,23 @@ def test_osqp_and_the_closed_form_push_the_same_way(tmp_path):
     assert exact[0][2] != exact[-1][2]
     worst = max(abs(a - b) for one, two in zip(exact, osqp, strict=True) for a, b in zip(one, two, strict=True))
     assert 0.0 < worst < 1e-6  # zero: the same solver twice
+
+
+def test_a_disk_that_fills_up_is_a_sentence_and_what_was_written_can_be_saved(tmp_path):
+    words = [sys.executable, "-c", PUSH, *SHORT, "--out", str(tmp_path / "run"), "--json"]
+    done = subprocess.run(
+        words,
+        cwd=ROOT,
+        env=os.environ | {"XDG_STATE_HOME": str(tmp_path), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000)),
+    )
+    error = json.loads(done.stdout)["error"]
+    assert (done.returncode, error["code"]) == (3, 3)
+    assert error["where"].endswith("run.mcap")
+    assert "unexpected" not in done.stderr
+    assert push("log", "recover", tmp_path / "run", state=tmp_path).returncode == 0
+    assert push("replay", tmp_path / "run" / "run_recovered.mcap", state=tmp_path).returncode == 0

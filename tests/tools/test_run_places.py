@@ -117,3 +117,10 @@ def test_a_tare_that_cannot_be_kept_does_not_take_the_verdict_with_it(state, cap
     }
     run_command.keep_tare(rig, figures)
     assert "the tare was not kept" in capsys.readouterr().err
+
+
+def test_a_json_file_that_cannot_be_written_leaves_no_part_of_it(tmp_path):
+    (tmp_path / "summary.json").mkdir()
+    with pytest.raises(OSError, match="directory"):
+        run_dir.write_json(tmp_path / "summary.json", {})
+    assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]

@@ -66,5 +66,9 @@ def write_config(path: Path, rig: RigConfig) -> str:
 def write_json(path: Path, value: object) -> None:
     """Write a JSON file whole or not at all."""
     part = path.with_suffix(".part")
-    part.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    part.replace(path)
+    try:
+        part.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
