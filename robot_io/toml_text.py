@@ -19,7 +19,8 @@ Origins = dict[KeyPath, str]
 
 _MOST_CHARACTERS = 64 << 10
 _MOST_DOTS = 200
-"""In a line. `tomllib` takes memory by the square of a key's parts, and the text may come out of a log."""
+"""In a key. `tomllib` takes memory by the square of a key's parts, and the text may come out of a log."""
+_BETWEEN_KEYS = re.compile(r"[,={}\[\]\n\r]")
 _HEADER = re.compile(r"\[([^\[\]]+)\]\s*(?:#.*)?\Z")
 _KEY = re.compile(r"([A-Za-z0-9_.\-\"' \t]+)=")
 
@@ -28,7 +29,7 @@ def parse(text: str, name: str) -> tuple[dict[str, Any], Origins]:
     """Return the tables of `text` and the origin (`name:line`) of each key; ConfigError when it is not TOML."""
     if len(text) > _MOST_CHARACTERS:
         raise ConfigError(f"{len(text)} characters are too many for a rig", where=name)
-    if any(line.count(".") > _MOST_DOTS for line in text.splitlines()):
+    if any(piece.count(".") > _MOST_DOTS for piece in _BETWEEN_KEYS.split(text)):
         raise ConfigError("this is nested too deep to be a rig", where=name)
     try:
         data = tomllib.loads(text)
