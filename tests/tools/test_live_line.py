@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import pty
+import struct
+import termios
 import time
+
+import pytest
 
 from robot_io.config import load_rig
 from safety.faults import FAULTS
@@ -73,6 +78,32 @@ def test_a_full_pipe_holds_nobody_up():
         assert 100 < len(lines) < 2000
         live.say("again")
         assert os.read(to_pipe, 65536) == b"again\n"
+
+
+def resize(fd, columns):
+    fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+
+
+@pytest.mark.parametrize("columns", [20, 40, 80, 132, 0])
+def test_it_stays_one_line_on_any_terminal(columns):
+    """A line as wide as the terminal would wrap, and could not be rewritten; 0 columns: the terminal does not say."""
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "w") as stderr, contextlib.redirect_stderr(stderr):
+        resize(theirs, 132)
+        live = LiveLine(load_rig("emulated"))
+        live.show(STATUS)
+        os.read(ours, 65536)
+        resize(theirs, columns)
+        live.show({**STATUS, "phase": "APPROACH"})
+        live.say("a word")
+        shown = b""
+        while not shown.endswith(b"\n"):  # a terminal hands over in pieces
+            shown += os.read(ours, 65536)
+    os.close(ours)
+    rewritten = shown.decode().strip().split("\r")
+    assert max(len(part) for part in rewritten) < (columns or 80)
+    assert rewritten[0].startswith("APPROACH  PUSHING"[: (columns or 80) - 1])
+    assert rewritten[-1] == "a word"
 
 
 def test_a_stopped_terminal_holds_nobody_up():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import select
 import sys
 import time
@@ -10,6 +11,10 @@ from typing import Any
 
 from robot_io.config import RigConfig
 from safety.faults import FAULTS
+
+
+USUAL_COLUMNS = 80
+"""Width of a terminal that does not say."""
 
 
 class LiveLine:
@@ -38,7 +43,10 @@ class LiveLine:
         self._last_s = now_s
         line = self._line(status)
         if self._terminal:
-            self._write(f"\r{line:<{self._width}}")
+            # Cut, because a line that wraps cannot be rewritten: it would fill the screen.
+            room = self._room()
+            line = line[:room]
+            self._write(f"\r{line:<{min(self._width, room)}}")
             self._width = len(line)
         else:
             self._write(line + "\n")
@@ -46,7 +54,7 @@ class LiveLine:
     def say(self, text: str) -> None:
         """Print a line of its own."""
         if self._terminal and self._width:
-            self._write("\r" + " " * self._width + "\r")
+            self._write("\r" + " " * min(self._width, self._room()) + "\r")
             self._width = 0
         self._write(text + "\n")
 
@@ -62,10 +70,19 @@ class LiveLine:
         fx, fy, _ = status["force_N"]
         control = self._rig.control
         return (
-            f"{status['phase']:<9} {status['progress_m']:6.2f}/{control.distance_m:.2f} m"
+            f"{status['phase']:<9} {status['mode']:<7} {status['progress_m']:5.2f}/{control.distance_m:.2f} m"
             f"  off {status['lateral_m']:+.3f} m  |F| {math.hypot(fx, fy):5.1f}/{self._rig.limits.max_force_N:.0f} N"
-            f"  theta_p {math.degrees(status['theta_p']):+6.1f} deg  v {status['speed']:.2f} m/s  {status['mode']}"
+            f"  v {status['speed']:.2f} m/s  theta_p {math.degrees(status['theta_p']):+6.1f} deg"
         )
+
+    @staticmethod
+    def _room() -> int:
+        """Return how many characters fit before the terminal's right edge; it may be resized at any time."""
+        try:
+            columns = os.get_terminal_size(sys.stderr.fileno()).columns
+        except (OSError, AttributeError, ValueError):
+            columns = 0
+        return (columns or USUAL_COLUMNS) - 1
 
     def _write(self, text: str) -> None:
         try:
