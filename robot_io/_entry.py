@@ -13,7 +13,7 @@ import os
 import sys
 from pathlib import Path
 
-from robot_io.errors import EnvironmentFault
+from robot_io.errors import EnvironmentFault, OperatorStop
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("control", "safety", "sim_backend", "tools")
@@ -48,9 +48,11 @@ def main() -> int:
     put_root_first()
     try:
         check_packages()
-    except EnvironmentFault as fault:
+        # By name: robot_io stands alone, and only this entry starts the layer above it.
+        program = importlib.import_module("tools.cli")
+    except (EnvironmentFault, KeyboardInterrupt) as ended:
         from robot_io.error_report import report
 
-        return report(fault, as_json="--json" in sys.argv)
-    # By name: robot_io stands alone, and only this entry starts the layer above it.
-    return int(importlib.import_module("tools.cli").main(sys.argv[1:]))
+        error = ended if isinstance(ended, EnvironmentFault) else OperatorStop("stopped by the operator")
+        return report(error, as_json="--json" in sys.argv)
+    return int(program.main(sys.argv[1:]))

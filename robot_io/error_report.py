@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import sys
 import tempfile
 import traceback
+from collections.abc import Iterator
 
 from robot_io.errors import PushError
 
@@ -31,11 +33,29 @@ def say_json(value: object) -> None:
         print(json.dumps(value, allow_nan=False), flush=True)
 
 
+@contextlib.contextmanager
+def exit_code_matters_more() -> Iterator[None]:
+    """Lose what is printed on stdout in here when nobody takes it (a closed pipe or terminal, a full disk)."""
+    try:
+        yield
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        give_stdout_up()
+
+
+def give_stdout_up() -> None:
+    """Send stdout nowhere: Python flushes it once more at exit, and would end with a code of its own."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.close(null)
+
+
 def report(error: PushError, *, as_json: bool) -> int:
     """Tell about `error` in one sentence, with `--json` also as the last line of stdout; return the exit code."""
     tell(printable(f"push: {error}"))
     if as_json:
-        with contextlib.suppress(OSError):  # the error may be that stdout takes nothing
+        with exit_code_matters_more():
             say_json({"schema": SCHEMA, "error": error.as_json()})
     return error.exit_code
 

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import NamedTuple, NoReturn
 
-from robot_io.error_report import report, unexpected
+from robot_io.error_report import exit_code_matters_more, give_stdout_up, report, unexpected
 from robot_io.errors import EnvironmentFault, OperatorStop, PushError, UsageError
 
 BROKEN_PIPE = 141
@@ -103,16 +103,12 @@ def main(argv: Sequence[str]) -> int:
         return report(OperatorStop("stopped by the operator"), as_json=as_json)
     except Exception as error:
         if isinstance(error, BrokenPipeError) and _reader_of_stdout_is_gone():
-            _turn_stdout_away()
+            give_stdout_up()
             return BROKEN_PIPE
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:
             where = str(error.filename or "")  # none: where the output goes
-            code = report(EnvironmentFault("there is no room left on the disk", where=where), as_json=as_json)
-            try:
-                sys.stdout.flush()
-            except OSError:
-                _turn_stdout_away()
-            return code
+            with exit_code_matters_more():
+                return report(EnvironmentFault("there is no room left on the disk", where=where), as_json=as_json)
         return report(unexpected(error), as_json=as_json)
     return code
 
@@ -180,11 +176,6 @@ def keep_standard_descriptors() -> None:
             os.fstat(fd)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is fd
-
-
-def _turn_stdout_away() -> None:
-    """Let all further output vanish: Python flushes stdout once more at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _reader_of_stdout_is_gone() -> bool:

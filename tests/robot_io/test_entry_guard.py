@@ -60,3 +60,16 @@ def test_foreign_module_already_loaded_is_one_sentence_and_exit_3(preload, forei
     assert done.stderr.count("\n") == 1
     answer = json.loads(done.stdout)
     assert answer["error"]["code"] == 3
+
+
+def test_ctrl_c_while_it_is_still_loading_is_one_sentence(tmp_path):
+    """The first tenths of a second go into imports; a stop that comes then must not end in a traceback."""
+    code = (
+        "import importlib, os, signal\nimport robot_io._entry as entry\nreal = importlib.import_module\n"
+        "def interrupted(name):\n    os.kill(os.getpid(), signal.SIGINT)\n    return real(name)\n"
+        "importlib.import_module = interrupted\nraise SystemExit(entry.main())"
+    )
+    done = run(code, ROOT, tmp_path, "config", "check", "sim", "--json")
+    assert done.returncode == 130
+    assert done.stderr == "push: stopped by the operator\n"
+    assert json.loads(done.stdout)["error"]["code"] == 130

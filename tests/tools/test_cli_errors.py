@@ -212,6 +212,23 @@ def test_output_to_a_full_disk_is_one_sentence(words):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize("gone", ["a closed pipe", "a full disk"])
+def test_an_error_that_nobody_reads_keeps_its_code(gone):
+    if gone == "a closed pipe":
+        read_fd, stdout = os.pipe()
+        os.close(read_fd)
+    else:
+        stdout = os.open("/dev/full", os.O_WRONLY)
+    done = subprocess.run(
+        [*PUSH, "config", "check", "emulatd", "--json"],
+        cwd=ROOT, timeout=60, check=False, stdout=stdout, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    os.close(stdout)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
 def test_closed_descriptors_are_filled_before_anything_opens():
     code = (
         "import os\nfor fd in (0, 1, 2): os.close(fd)\n"
