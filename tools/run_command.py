@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_io.config import RigConfig
-from robot_io.error_report import say_json, tell
+from robot_io.error_report import exit_code_matters_more, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools.report.process import ReportProcess
@@ -66,10 +66,11 @@ def run(args: argparse.Namespace) -> int:
     if not args.no_report:
         report(summary, out, early)
         write_summary(summary, out)
-    for line in verdict.person_lines(summary):
-        tell(line) if args.json else print(line)
-    if args.json:
-        say_json(summary)
+    with exit_code_matters_more():
+        for line in verdict.person_lines(summary):
+            tell(line) if args.json else print(line)
+        if args.json:
+            say_json(summary)
     return int(summary["exit_code"])
 
 
@@ -202,7 +203,7 @@ def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
         bias = (*figures["bias_force_N"], *figures["bias_torque_Nm"])
         try:
             saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
-        except OSError as error:
+        except (OSError, EnvironmentFault) as error:
             tell(f"the tare was not kept: {error}")
 
 

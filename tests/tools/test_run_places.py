@@ -124,3 +124,14 @@ def test_a_json_file_that_cannot_be_written_leaves_no_part_of_it(tmp_path):
     with pytest.raises(OSError, match="directory"):
         run_dir.write_json(tmp_path / "summary.json", {})
     assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
+
+
+def test_nor_does_a_state_folder_that_cannot_be_made(tmp_path, monkeypatch, capsys):
+    """A simulated run needs no lock, so that it meets the folder only when all is done."""
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
+    figures = {"tared": True, "bias_force_N": [0.0] * 3, "bias_torque_Nm": [0.0] * 3, "held_joints_rad": [0.0] * 6}
+    run_command.keep_tare(load_rig("sim"), figures)
+    said = capsys.readouterr().err
+    assert "the tare was not kept" in said
+    assert "XDG_STATE_HOME" in said

@@ -12,7 +12,6 @@ from typing import Any
 from robot_io.config import RigConfig
 from safety.faults import FAULTS
 
-
 USUAL_COLUMNS = 80
 """Width of a terminal that does not say."""
 
