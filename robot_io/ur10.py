@@ -59,6 +59,7 @@ def spawn_child(
         stdout=subprocess.DEVNULL,
         stderr=stderr,
         pass_fds=[fd for fd in (record_fd, status_fd) if fd is not None],
+        start_new_session=True,  # Ctrl-Z and a closed terminal are for the caller, not for its whole group
     )
     assert child.stdin is not None, "stdin is a pipe"
     with contextlib.suppress(BrokenPipeError):  # it died at once: its status or its exit tells

@@ -102,7 +102,7 @@ def test_it_stays_one_line_on_any_terminal(columns):
     os.close(ours)
     rewritten = shown.decode().strip().split("\r")
     assert max(len(part) for part in rewritten) < (columns or 80)
-    assert rewritten[0].startswith("APPROACH  PUSHING"[: (columns or 80) - 1])
+    assert rewritten[0].startswith("APPROACH    0.50/2.00 m  PUSHING"[: (columns or 80) - 1])
     assert rewritten[-1] == "a word"
 
 

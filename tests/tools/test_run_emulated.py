@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import importlib.util
 import json
 import os
@@ -270,6 +271,10 @@ class Terminal:
             self.shown += os.read(self.fd, 65536)
         return self.shown[-600:].decode(errors="replace")
 
+    def taken(self):
+        """Make it the controlling terminal of the process that is being started: its signals go to the whole group."""
+        fcntl.ioctl(self.theirs, termios.TIOCSCTTY, 0)
+
     def close(self):
         os.close(self.fd)
         os.close(self.theirs)
@@ -297,14 +302,36 @@ def test_on_a_terminal_any_key_stops(state, tmp_path, host):
 
 @repeated_when_the_host_stalls
 def test_a_closed_terminal_is_a_clean_stop(state, tmp_path, host):
-    """The window is closed, or the connection of a remote login breaks: SIGHUP, and nobody to write to."""
+    """The window is closed, or the connection of a remote login breaks: SIGHUP for all of the launcher's group, and
+    nobody to write the verdict to."""
+    terminal = Terminal()
+    out = tmp_path / "run"
+    streams = {"stdin": terminal.theirs, "stdout": terminal.theirs, "stderr": terminal.theirs}
+    argv = ("run", "emulated", *QUICK, "--out", str(out))
+    with started(state, *argv, host=host, preexec_fn=terminal.taken, **streams) as run:
+        terminal.wait_for(b"PUSH ")
+        terminal.close()
+        assert run.wait(20.0).code == 130
+        assert run.left_files() == []
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["verdict"], summary["faults"], summary["notes"]) == ("operator stop", ["F64"], [])
+
+
+@pytest.mark.parametrize("key", [b"\x1a", b"\x1c"], ids=["Ctrl-Z", "Ctrl-backslash"])
+@repeated_when_the_host_stalls
+def test_keys_that_a_terminal_makes_signals_of_stop_like_any_other(state, tmp_path, host, key):
+    """A launcher put to sleep would hear no key, and the base would push on; the other processes hear none of it."""
     terminal = Terminal()
     out = tmp_path / "run"
     argv = ("run", "emulated", *QUICK, "--out", str(out), "--json")
-    with started(state, *argv, host=host, stdin=terminal.theirs, stderr=terminal.theirs) as run:
+    streams = {"stdin": terminal.theirs, "stderr": terminal.theirs}
+    with started(state, *argv, host=host, preexec_fn=terminal.taken, **streams) as run:
         terminal.wait_for(b"PUSH ")
-        terminal.close()
-        assert_clean_stop(run, out, signal.SIGHUP)
+        os.write(terminal.fd, key)
+        assert_clean_stop(run, out)
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["faults"], summary["notes"]) == (["F64"], [])
+    terminal.close()
 
 
 @pytest.mark.long

@@ -69,7 +69,7 @@ class LiveLine:
         fx, fy, _ = status["force_N"]
         control = self._rig.control
         return (
-            f"{status['phase']:<9} {status['mode']:<7} {status['progress_m']:5.2f}/{control.distance_m:.2f} m"
+            f"{status['phase']:<9} {status['progress_m']:6.2f}/{control.distance_m:.2f} m  {status['mode']:<7}"
             f"  off {status['lateral_m']:+.3f} m  |F| {math.hypot(fx, fy):5.1f}/{self._rig.limits.max_force_N:.0f} N"
             f"  v {status['speed']:.2f} m/s  theta_p {math.degrees(status['theta_p']):+6.1f} deg"
         )

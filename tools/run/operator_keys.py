@@ -14,7 +14,9 @@ from typing import Any
 
 from robot_io.event_loop import EventLoop
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+"""What a terminal makes of Ctrl-C, Ctrl-\\ and Ctrl-Z is among them: keys like any other. A launcher that was put to
+sleep by Ctrl-Z would let the base push on, and hear no key."""
 
 
 class OperatorKeys:
