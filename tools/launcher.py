@@ -41,6 +41,8 @@ OTHERS_NS = 4 * NS_PER_S
 """After the first device failed, the others may still say what is wrong with them."""
 FROZEN_NS = NS_PER_S
 """The gate has latched and control has not spoken for this long: it is frozen, and is killed."""
+FIRST_WORD_NS = 5 * NS_PER_S
+"""Control was let go and its loop has said nothing for this long: it froze before the gate could know it by silence."""
 AGAIN_NS = NS_PER_S
 """A second stop counts from here on; before, it is the same one (`timeout` and shells signal twice)."""
 ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0}
@@ -159,11 +161,13 @@ class Launcher:
     def _watch(self) -> None:
         """Wait for control's end."""
         control = self._children["control"]
+        went_ns = monotonic_ns()
         try_realtime(PRIORITY)
         try:
             while control.process.poll() is None:
                 self._loop.run_once(50)
-                if self._gate_latch and monotonic_ns() - self._status_ns > FROZEN_NS:
+                allowed_ns = FROZEN_NS if self._gate_latch else FIRST_WORD_NS if not self._status_ns else None
+                if allowed_ns and monotonic_ns() - (self._status_ns or went_ns) > allowed_ns:
                     control.process.kill()  # the base has its zeros; a frozen control would only hide the end
         finally:
             leave_realtime()

@@ -18,7 +18,7 @@ from robot_io.tick import TICK_CDR
 from safety.faults import FAULTS
 from tests.faults.kill_rounds import Round, pushing, strike, within
 from tests.host_watch import repeated_when_the_host_stalls
-from tests.push_runs import PUSH, QUICK, ROOT, messages, stands, started, world_of
+from tests.push_runs import PUSH, QUICK, ROOT, messages, one_error, stands, started, world_of
 
 KILL, STOP = signal.SIGKILL, signal.SIGSTOP
 ZERO_MS = 20.0
@@ -188,6 +188,24 @@ def test_an_exception_in_the_loop(state, tmp_path, host):
     assert (zero_ns - failed_ns) / 1e6 < ZERO_MS
     assert stands(wheels[-1][1])
     replays(tmp_path / "run")
+
+
+FROZEN_BEFORE_ITS_FIRST_TICK = """
+import sys
+if "tools.run.control_process" in sys.orig_argv:
+    import gc, os, signal
+    gc.freeze = lambda: os.kill(os.getpid(), signal.SIGSTOP)
+"""
+
+
+def test_control_frozen_before_its_first_tick(state, tmp_path):
+    """The gate has heard nothing yet that could fall silent; the run ends all the same, and says why."""
+    (tmp_path / "sitecustomize.py").write_text(FROZEN_BEFORE_ITS_FIRST_TICK)
+    argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
+    with started(state, *argv, env={"PYTHONPATH": str(tmp_path)}) as run:
+        error = one_error(run.wait(40.0), 5)
+        run.wait_gone(3.0)
+    assert "control process was killed by SIGKILL" in error["what"]
 
 
 ENDLESS_FOLD = """
