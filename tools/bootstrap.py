@@ -27,6 +27,11 @@ NO_WHEEL = (
 )
 
 
+UNFINISHED = ".unfinished"
+"""In an environment that is being made or filled; one that still has it was left half-made by a kill, and is made anew:
+what is half there looks installed."""
+
+
 class SetUpError(Exception):
     """Set-up cannot go on; the text is the one sentence that helps."""
 
@@ -68,16 +73,23 @@ def choose_python() -> str:
     return os.path.realpath(getattr(sys, "_base_executable", sys.executable))
 
 
+def make_folder(venv: Path) -> None:
+    """Make `venv` a new folder, marked as unfinished."""
+    shutil.rmtree(venv, ignore_errors=True)
+    venv.mkdir()
+    (venv / UNFINISHED).touch()
+
+
 def make_venv(python: str, venv: Path) -> list[str]:
     """Make `venv` and return the command that installs with pip into it."""
     inside = [str(venv / "bin" / "python"), "-m", "pip"]
     if (venv / "bin" / "uv").exists() or run(*inside, "--version"):
         return inside  # it is there already
-    shutil.rmtree(venv, ignore_errors=True)
+    make_folder(venv)
     if run(python, "-m", "venv", str(venv)) and run(*inside, "--version"):
         return inside
     # Without python3-venv there is no pip to put in, but a system pip can install into another environment.
-    shutil.rmtree(venv, ignore_errors=True)
+    make_folder(venv)
     outside = [python, "-m", "pip", "--python", str(venv / "bin" / "python")]
     if run(python, "-m", "venv", "--without-pip", str(venv)) and run(*outside, "--version"):
         return outside
@@ -93,6 +105,8 @@ def install(kind: str, pip: list[str], venv: Path) -> None:
         # Compiled at once, as pip does: matplotlib and numpy would otherwise be compiled by the first runs, or,
         # where PYTHONDONTWRITEBYTECODE is set, by every process of every run.
         into = ["--compile-bytecode", "--python", str(venv / "bin" / "python")]
+        if not run(uv, "pip", "list", *into[1:]):  # nowhere to keep what it fetches, as in a home that is read-only
+            into.append("--no-cache")
         done = run(uv, "pip", "install", "-q", *into, *wanted, quiet=False)
     else:
         done = run(*pip, "install", "-q", "--disable-pip-version-check", *wanted, quiet=False)
@@ -107,21 +121,23 @@ def set_up(kind: str, venv: Path) -> None:
     digest = digest_of_inputs()
     home = f"{python} in {ROOT}"
     stamp = venv / ".installed"
-    installed, for_digest, at_home = (stamp.read_text(encoding="utf-8").splitlines() if stamp.is_file() else [""] * 3)[
-        :3
-    ]
-    if at_home == home and for_digest == digest and installed in ("dev", kind):  # dev holds all of runtime
+    written = stamp.read_text(encoding="utf-8").splitlines() if stamp.is_file() else []
+    installed, for_digest, at_home = (*written, "", "", "")[:3]
+    # dev holds all of runtime
+    if at_home == home and for_digest == digest and installed in ("dev", kind) and not (venv / UNFINISHED).exists():
         return
     print(f"setting up {venv.name} ({kind}) with {python}: about half a minute the first time", flush=True)
-    if at_home not in ("", home):  # another Python, or the folder was moved: its scripts would not start
-        shutil.rmtree(venv)
+    # Another Python, or the folder was moved: its scripts would not start. Or half-made.
+    if at_home not in ("", home) or (venv / UNFINISHED).exists():
+        make_folder(venv)
     pip = make_venv(python, venv)
-    if stamp.is_file():
-        stamp.unlink()
+    (venv / UNFINISHED).touch()
+    stamp.unlink(missing_ok=True)
     # What `make test` once installed stays installed when `make demo` follows a change.
     kind = "dev" if installed == "dev" else kind
     install(kind, pip, venv)
     stamp.write_text(f"{kind}\n{digest}\n{home}\n", encoding="utf-8")
+    (venv / UNFINISHED).unlink()
 
 
 def main() -> int:
@@ -135,6 +151,12 @@ def main() -> int:
         except SetUpError as error:
             print(f"set-up: {error}", file=sys.stderr)
             return 2
+        except OSError as error:  # a checkout of somebody else's, a full disk
+            print(f"set-up: {error.filename or ROOT} cannot be written: {error.strerror}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("set-up: stopped; the next make goes on", file=sys.stderr)
+            return 130
     return 0
 
 

@@ -120,12 +120,60 @@ def test_stamp_of_other_pins_python_or_folder_does_not_count(recorded, tmp_path)
         (venv / "marker").touch()
         (venv / ".installed").write_text(changed, encoding="utf-8")
         commands.clear()
-        try:
-            bootstrap.set_up("runtime", venv)
-        except FileNotFoundError:  # the recorded commands make no folder anew
-            assert not kept
+        bootstrap.set_up("runtime", venv)
         assert commands[-1][-1].endswith("[dev,sweep,cluster]")
         assert (venv / "marker").exists() == kept
+
+
+@pytest.mark.parametrize("stamp", ["", "runtime\n", None])
+def test_one_left_half_made_by_a_kill_is_made_anew(recorded, tmp_path, stamp):
+    """What a killed installer left looks installed, and is not."""
+    record, commands = recorded
+    venv = tmp_path / ".venv"
+
+    class KilledError(Exception):
+        pass
+
+    def killed(*command, quiet=True):
+        if "-e" in command:
+            (venv / "half").touch()
+            raise KilledError
+        return record(*command)
+
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(KilledError):
+        patch.setattr(bootstrap, "run", killed)
+        venv.mkdir()
+        bootstrap.set_up("runtime", venv)
+    if stamp is not None:  # the kill may come while it is written, too
+        (venv / ".installed").write_text(stamp, encoding="utf-8")
+    bootstrap.set_up("runtime", venv)
+    assert not (venv / "half").exists()
+    commands.clear()
+    bootstrap.set_up("runtime", venv)
+    assert commands == []
+
+
+def test_a_home_that_keeps_nothing_is_no_hindrance(recorded, tmp_path, monkeypatch):
+    record, commands = recorded
+    venv = tmp_path / ".venv"
+    venv.mkdir()
+    bootstrap.set_up("runtime", venv)
+    assert "--no-cache" not in commands[-1]
+    monkeypatch.setattr(bootstrap, "run", lambda *command, quiet=True: record(*command) and "list" not in command)
+    bootstrap.set_up("dev", venv)
+    assert "--no-cache" in commands[-1]
+
+
+def test_a_checkout_that_cannot_be_written_is_said(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(sys, "argv", ["bootstrap.py", "runtime"])
+    monkeypatch.setattr(bootstrap, "ROOT", tmp_path)
+    for name in ("pyproject.toml", "constraints.txt"):
+        (tmp_path / name).touch()
+    (tmp_path / ".venv").touch()  # in the way, as a folder of somebody else's would be
+    assert bootstrap.main() == 2
+    said = capsys.readouterr().err
+    assert f"{tmp_path / '.venv'} cannot be written" in said
+    assert "apt" not in said
 
 
 def test_without_uv_plain_pip_installs(recorded, tmp_path):
