@@ -16,7 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from robot_io import toml_text
-from robot_io.config_types import Level, Matrix3, NonNegative, Positive, Table, Vector2, Vector3, Vector6
+from robot_io.config_types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Positive, Table
 from robot_io.errors import ConfigError
 from robot_io.table_check import build
 from robot_io.toml_text import Origins
@@ -48,7 +48,7 @@ class ArmConfig(Table, frozen=True):
     level: Level = "emulated"
     host: str = ""
     hold: Literal["monitor", "servo"] = "monitor"
-    held_pose_rad: Vector6 = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.3100)
+    held_pose_rad: Joints = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.3100)
     held_pose_tolerance_rad: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
     """How far the measured joints may be from `held_pose_rad` at start."""
 
@@ -95,15 +95,15 @@ class FramesConfig(Table, frozen=True):
     """
 
     base_from_sensor: Matrix3
-    contact_in_base_m: Vector3
-    sensor_in_base_m: Vector3
-    base_from_marker: Vector3 = (0.0, 0.0, 0.0)
+    contact_in_base_m: InBase
+    sensor_in_base_m: InBase
+    base_from_marker: InBase = (0.0, 0.0, 0.0)
 
 
 class PathConfig(Table, frozen=True):
     """The straight path in the WORLD frame: a point on it (from which distance is expected) and its direction."""
 
-    origin_m: Vector2 = (0.0, 0.0)
+    origin_m: InRoom = (0.0, 0.0)
     direction_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
     expected_contact_m: Annotated[float, Meta(ge=0, le=2)] = 0.05
     """Distance from where the approach starts to where the object is expected."""
@@ -233,7 +233,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
     if path.resolve() in seen:
         raise ConfigError("this rig extends itself", where=str(path))
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # a byte order mark, as some editors write, is no mistake
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot read it: {error}", where=str(path)) from None
     data, origins = toml_text.parse(text, str(path))

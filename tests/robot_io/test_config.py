@@ -196,6 +196,12 @@ def test_extends_another_file_and_never_itself(tmp_path):
         load_rig(child)
 
 
+def test_a_byte_order_mark_is_no_mistake(tmp_path):
+    rig = tmp_path / "bom.toml"
+    rig.write_text('extends = "emulated"\nname = "bom"\n', encoding="utf-8-sig")
+    assert load_rig(rig).name == "bom"
+
+
 def test_directory_and_binary_are_sentences(tmp_path):
     binary = tmp_path / "b.toml"
     binary.write_bytes(b"\xff\xfe\x00")

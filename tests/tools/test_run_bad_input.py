@@ -51,10 +51,20 @@ def push_fails(state, tmp_path, code, *argv, also_plain=True):
         ("control.push_sped_m_per_s=0.1", ["push_sped_m_per_s", "push_speed_m_per_s"]),
         ("control.push_speed_m_per_s=100", ["push_speed_m_per_s", "100", "0.5"]),
         ("limits.max_force_N=-150", ["max_force_N", "-150"]),
+        ("frames.contact_in_base_m=[938, 215, 600]", ["contact_in_base_m", "938", "5.0"]),
+        ("arm.held_pose_rad=[90, -10, 90, -80, 90, 75]", ["held_pose_rad", "90", "6.3"]),
         ("control.k_f=many", ["k_f", "many"]),
         ("ft.level=sim", ["sim", "ft"]),
     ],
-    ids=["unknown key", "speed in mm/s", "negative limit", "a word", "sim beside others"],
+    ids=[
+        "unknown key",
+        "speed in mm/s",
+        "negative limit",
+        "point in mm",
+        "joints in degrees",
+        "a word",
+        "sim beside others",
+    ],
 )
 def test_settings_that_cannot_be(state, tmp_path, setting, words):
     error = push_fails(state, tmp_path, 2, "emulated", "--set", setting)
