@@ -217,7 +217,7 @@ def _find(name_or_path: str | Path) -> Path:
     if text in (shipped := shipped_rigs()):
         return RIGS_DIR / f"{text}.toml"
     path = Path(text)
-    if path.is_file():
+    if _is_file(path):
         return path
     if path.suffix == ".toml" or "/" in text:
         raise ConfigError("there is no such rig file", where=text)
@@ -226,6 +226,13 @@ def _find(name_or_path: str | Path) -> Path:
     raise ConfigError(
         f"there is no rig named `{text}`", do=f"{hint}Shipped rigs: {', '.join(shipped)}; or give the path of a file"
     )
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError as error:  # a folder that is not ours to look into, a name that is too long
+        raise ConfigError(f"cannot read it: {error.strerror}", where=str(path)) from None
 
 
 def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
@@ -243,5 +250,5 @@ def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
     if not isinstance(base, str):
         raise ConfigError("`extends` names a rig: a shipped name or a path", where=origins.get(("extends",), str(path)))
     beside = path.parent / base
-    below, below_origins = _read(beside if beside.is_file() else _find(base), (*seen, path.resolve()))
+    below, below_origins = _read(beside if _is_file(beside) else _find(base), (*seen, path.resolve()))
     return toml_text.merge(below, data), below_origins | origins

@@ -212,6 +212,24 @@ def test_output_to_a_full_disk_is_one_sentence(words):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["config", "check", "{}.toml"],
+        ["run", "sim", "--fast", "--out", "{}"],
+        ["replay", "{}"],
+        ["report", "{}"],
+        ["log", "info", "{}"],
+    ],
+    ids=lambda argv: argv[0],
+)
+def test_a_path_that_the_system_refuses_is_no_defect(argv, capsys):
+    """As for a folder of another user's, which cannot be tried as root: even to ask whether it is there fails."""
+    refused = "x" * 300
+    assert cli.main([word.format(refused) for word in argv]) == 2
+    assert "File name too long" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("gone", ["a closed pipe", "a full disk"])
 def test_an_error_that_nobody_reads_keeps_its_code(gone):
     if gone == "a closed pipe":

@@ -8,10 +8,17 @@ from robot_io.errors import UsageError
 
 
 def find_log(named: Path) -> Path:
-    """Return `named`, or the run.mcap in it when it is a run's folder. Raises UsageError when that has none."""
-    if not named.is_dir():
-        return named
+    """Return `named`, or the run.mcap in it when it is a run's folder.
+
+    Raises UsageError when that has none, or may not be looked into.
+    """
     log = named / "run.mcap"
-    if not log.exists():
+    try:
+        if not named.is_dir():
+            return named
+        there = log.exists()
+    except OSError as error:
+        raise UsageError(f"this cannot be read: {error.strerror}", where=str(named)) from None
+    if not there:
         raise UsageError("there is no run.mcap in this folder", where=str(named), do="Name the log itself")
     return log

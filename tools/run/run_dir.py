@@ -21,9 +21,9 @@ def create(out: str | None, rig_name: str) -> Path:
     Raises UsageError when it already holds a run, or cannot be made.
     """
     path = Path(out) if out else Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
-    if any((path / name).exists() for name in RUN_FILES) and out:
-        raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
     try:
+        if any((path / name).exists() for name in RUN_FILES) and out:
+            raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
         path = _made(path, given=bool(out))
         probe = path / ".writable"
         probe.touch()
