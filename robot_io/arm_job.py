@@ -68,5 +68,5 @@ def parse_status(line: bytes) -> ArmReady:
         raise kind(event["error"]["what"], where=event["error"]["where"], do=event["error"]["do"])
     except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
         raise DeviceError(
-            f"the arm's process reported {line[:100]!r}", do="This is a defect of the program."
+            f"the arm's process reported {line[:100]!r}", do="This is a defect of the program"
         ) from error

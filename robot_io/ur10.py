@@ -221,12 +221,12 @@ class Ur10(DriverBase):
             poll.register(listen_fd, select.POLLIN)
             if left_ms <= 0 or not poll.poll(left_ms):
                 raise DeviceUnreachable(
-                    f"the arm was not ready within {within_s:g} s", where=self.host, do="Check the robot, try again."
+                    f"the arm was not ready within {within_s:g} s", where=self.host, do="Check the robot, try again"
                 )
             data = os.read(listen_fd, 65536)
             if not data:
                 ended = _how_it_ended(self._child.wait(STOP_WITHIN_S))
-                raise DeviceUnreachable(f"{ended} before it was ready", where=self.host, do="Try again.")
+                raise DeviceUnreachable(f"{ended} before it was ready", where=self.host, do="Try again")
             line += data
         return parse_status(line.split(b"\n", 1)[0]).info
 

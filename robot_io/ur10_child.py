@@ -108,7 +108,7 @@ class ArmProcess:
         link = LinkState.LOST if error in FATAL else LinkState.UP
         self._publish(monotonic_ns(), link, error)
         kind = DeviceUnreachable if error in FATAL else DeviceNotReady
-        raise kind(_CAUSE[error], where=self._job.host, do="Look at the arm, then start again.")
+        raise kind(_CAUSE[error], where=self._job.host, do="Look at the arm, then start again")
 
     def _publish(self, now_ns: int, link: LinkState, error: ArmError) -> None:
         reader = self._reader

@@ -46,7 +46,7 @@ def preflight(host: str) -> DeviceInfo:
         model = dashboard.ask("get robot model")
         if model != MODEL:
             raise DeviceProtocolError(
-                f"this is a {model[:40]!r}, not a {MODEL}", where=host, do="Give the address of the UR10."
+                f"this is a {model[:40]!r}, not a {MODEL}", where=host, do="Give the address of the UR10"
             )
         serial = dashboard.ask("get serial number")
         _check_ready(host, dashboard)
@@ -69,7 +69,7 @@ def _read_version(host: str, deadline_s: float) -> tuple[int, int, int, int]:
         accepted = rtde.read_frame("V")
         if accepted != b"\x01":
             raise DeviceProtocolError(
-                "it does not speak RTDE protocol 2", where=rtde.where, do="A CB3 controller needs PolyScope 3.15."
+                "it does not speak RTDE protocol 2", where=rtde.where, do="A CB3 controller needs PolyScope 3.15"
             )
         rtde.send(_ASK_VERSION)
         body = rtde.read_frame("v")
@@ -86,7 +86,7 @@ def _check_version(host: str, version: tuple[int, int, int, int]) -> None:
             f"the controller runs PolyScope {'.'.join(map(str, version))}, this driver needs {MAJOR}.{MIN_MINOR} "
             f"or a newer {MAJOR}.x",
             where=host,
-            do="Update the controller, or use a UR10 with a CB3 controller.",
+            do="Update the controller, or use a UR10 with a CB3 controller",
         )
 
 
@@ -97,13 +97,13 @@ def _check_ready(host: str, dashboard: _Connection) -> None:
         raise DeviceNotReady(
             f"the arm is stopped by safety ({safety_mode})",
             where=host,
-            do="Clear the stop at the teach pendant, look at why it happened, and try again.",
+            do="Clear the stop at the teach pendant, look at why it happened, and try again",
         )
     if robot_mode != "RUNNING":
         raise DeviceNotReady(
             f"the arm is not running (robot mode {robot_mode})",
             where=host,
-            do="Switch the arm on and release the brakes at the teach pendant.",
+            do="Switch the arm on and release the brakes at the teach pendant",
         )
 
 
@@ -193,7 +193,7 @@ class _Connection:
 
     def _silent(self, what: str) -> DeviceUnreachable:
         return DeviceUnreachable(
-            what, where=self.where, do="Restart the controller if this stays, and check that nothing else holds it."
+            what, where=self.where, do="Restart the controller if this stays, and check that nothing else holds it"
         )
 
 
@@ -203,5 +203,5 @@ def _reason(error: Exception) -> str:
 
 def _not_a_robot(where: str, what: str) -> DeviceError:
     return DeviceProtocolError(
-        f"something there is not a UR controller: it {what}", where=where, do="Check the address of the arm."
+        f"something there is not a UR controller: it {what}", where=where, do="Check the address of the arm"
     )

@@ -52,7 +52,7 @@ class ArmReader:
             raise DeviceUnreachable(
                 f"the receive interface did not connect ({error})",
                 where=host,
-                do="Check that RTDE (port 30004) is reachable.",
+                do="Check that RTDE (port 30004) is reachable",
             ) from error
         self.packets = 0
         self.changed_ns = 0
@@ -68,7 +68,7 @@ class ArmReader:
                 raise DeviceUnreachable(
                     f"it accepted the connection and sent {self.packets} of {FLOW_PACKETS} packets within 1 s",
                     where=f"{self._host}:30004",
-                    do="Restart the controller if this stays.",
+                    do="Restart the controller if this stays",
                 )
             time.sleep(0.002)
             self.poll(monotonic_ns())

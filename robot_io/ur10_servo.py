@@ -67,13 +67,13 @@ class ActiveHold:
         try:
             if not self._rtde.setWatchdog(WATCHDOG_HZ):
                 raise DeviceNotReady(
-                    "the control script refused the watchdog", where=self._host, do="Use hold = monitor, or try again."
+                    "the control script refused the watchdog", where=self._host, do="Use hold = monitor, or try again"
                 )
             if not self._command(FIRST_COMMAND_WITHIN_S):  # waits until the script is ready; later calls return at once
                 raise DeviceNotReady(
                     "the control script refused the first target",
                     where=self._host,
-                    do="Use hold = monitor, or try again.",
+                    do="Use hold = monitor, or try again",
                 )
         except BaseException:
             self.end()
@@ -137,16 +137,16 @@ def _check_may_start(host: str, start: JointState, held_pose_rad: Joints | None,
         raise DeviceNotReady(
             "a program is playing on the controller, and holding actively would end it",
             where=host,
-            do="Stop the program at the teach pendant, or use hold = monitor.",
+            do="Stop the program at the teach pendant, or use hold = monitor",
         )
     if max(map(abs, start.velocity)) > AT_REST_RAD_PER_S:
-        raise DeviceNotReady("the arm is moving", where=host, do="Wait until it is at rest.")
+        raise DeviceNotReady("the arm is moving", where=host, do="Wait until it is at rest")
     if held_pose_rad is not None and max_difference(start.position, held_pose_rad) > tolerance_rad:
         raise DeviceNotReady(
             f"a joint is {max_difference(start.position, held_pose_rad):.3f} rad from the held pose, "
             f"more than {tolerance_rad:g}",
             where=host,
-            do="Move the arm to the held pose of the rig, or correct held_pose_rad.",
+            do="Move the arm to the held pose of the rig, or correct held_pose_rad",
         )
 
 
@@ -165,7 +165,7 @@ def _control_interface(host: str) -> Any:
         raise DeviceNotReady(
             f"the control script did not start ({str(error).splitlines()[0]})",
             where=host,
-            do="Check that no fieldbus or other client holds the RTDE input registers, or use hold = monitor.",
+            do="Check that no fieldbus or other client holds the RTDE input registers, or use hold = monitor",
         ) from error
 
 
@@ -173,6 +173,6 @@ def _wait_playing(host: str, reader: ArmReader) -> None:
     deadline_ns = monotonic_ns() + SCRIPT_START_NS
     while reader.joints is None or reader.joints.runtime_state != PLAYING:
         if monotonic_ns() > deadline_ns:
-            raise DeviceNotReady("the control script is not playing", where=host, do="Try again.")
+            raise DeviceNotReady("the control script is not playing", where=host, do="Try again")
         time.sleep(0.002)
         reader.poll(monotonic_ns())

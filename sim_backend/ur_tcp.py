@@ -121,7 +121,7 @@ class TcpServer:
     ) -> None:
         if not host.startswith("127."):
             raise UsageError(
-                "an emulated robot listens on loopback addresses only", where=host, do="Use an address 127.x.y.z."
+                "an emulated robot listens on loopback addresses only", where=host, do="Use an address 127.x.y.z"
             )
         self.loop = loop
         self.clients: set[TcpClient] = set()
@@ -185,6 +185,6 @@ def _cannot_listen(error: OSError, where: str) -> EnvironmentFault:
         return EnvironmentFault(
             "the port is already in use",
             where=where,
-            do="Another emulator runs there: stop it, or choose another address 127.x.y.z.",
+            do="Another emulator runs there: stop it, or choose another address 127.x.y.z",
         )
-    return EnvironmentFault(f"cannot listen: {error.strerror}", where=where, do="Choose another address 127.x.y.z.")
+    return EnvironmentFault(f"cannot listen: {error.strerror}", where=where, do="Choose another address 127.x.y.z")

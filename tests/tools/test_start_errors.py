@@ -35,7 +35,7 @@ def child():
         found.close()
 
 
-def said(code, what, where="there", do="Do this."):
+def said(code, what, where="there", do="Do this"):
     return {"code": code, "what": what, "where": where, "do": do}
 
 

@@ -36,7 +36,7 @@ def combined(failed: list[Child]) -> PushError:
         only = found[0]
         return kind(only.what, where=_named(only.name, only.where), do=only.do)
     what = "; ".join(f"{_named(failure.name, failure.where)}: {failure.what}" for failure in found)
-    do = "; ".join(f"{_device(failure.name)}: {failure.do.rstrip('.')}" for failure in found if failure.do)
+    do = "; ".join(f"{_device(failure.name)}: {failure.do}" for failure in found if failure.do)
     return kind(what, do=do)
 
 
