@@ -44,7 +44,7 @@ def advance(
     if phase == Phase.TARE:
         return _tare(settings, state, inp, along)
     if phase == Phase.APPROACH:
-        return _approach(settings, state, inp, contact, along)
+        return _approach(settings, state, inp, along)
     if phase in (Phase.PUSH, Phase.LOST):
         return _push(settings, state, inp, contact)
     if phase == Phase.LOST_HOLD:
@@ -129,9 +129,7 @@ def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float)
     )
 
 
-def _approach(
-    settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float], along: float
-) -> ControlState:
+def _approach(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
     control = settings.control
     if state.contact_run >= control.contact_samples:
         return _enter(

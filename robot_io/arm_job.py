@@ -67,6 +67,4 @@ def parse_status(line: bytes) -> ArmReady:
         kind = _KINDS.get(event["kind"], DeviceError)
         raise kind(event["error"]["what"], where=event["error"]["where"], do=event["error"]["do"])
     except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
-        raise DeviceError(
-            f"the arm's process reported {line[:100]!r}", do="This is a defect of the program"
-        ) from error
+        raise DeviceError(f"the arm's process reported {line[:100]!r}", do="This is a defect of the program") from error

@@ -34,8 +34,6 @@ class ArmError(IntEnum):
     """Active holding was given up: the joints were too far from the held target."""
     SERVO_STALE = 6
     """Active holding was given up: no new packet for too long."""
-    PROCESS_FAILED = 7
-    """The arm's process met an error of its own."""
 
 
 class ArmRecord(msgspec.Struct, frozen=True, gc=False):

@@ -81,7 +81,6 @@ class BaseConfig(Table, frozen=True):
     url: str = ""
     pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
-    odometry_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 50.0
     topics: TopicsConfig = TopicsConfig()
 
 

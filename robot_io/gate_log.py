@@ -10,6 +10,7 @@ from robot_io.log_channels import CHANNELS, Kind
 from robot_io.log_messages import GateDecision, SafetyEvent
 from robot_io.messages import BodyTwist, Stamped
 from robot_io.ros_messages import (
+    UNKNOWN_COVARIANCE,
     Header,
     Odometry,
     PoseStamped,
@@ -24,8 +25,6 @@ from robot_io.ros_messages import (
 from robot_io.tick import Mode
 
 WORLD_FRAME, BASE_FRAME = "world", "base_link"
-_UNKNOWN = (0.0,) * 36
-"""Covariance that says nothing, as ROS has it."""
 
 
 class GateLog:
@@ -46,8 +45,8 @@ class GateLog:
             pose = planar_pose(value.pose.x, value.pose.y, value.pose.yaw)
             self._push(Kind.SLIDER_POSE, at_ns, PoseStamped(header, pose))
         elif isinstance(value, BaseOdometry):
-            unplaced = PoseWithCovariance(planar_pose(math.nan, math.nan, 0.0), _UNKNOWN)
-            twist = TwistWithCovariance(_twist(value.twist), _UNKNOWN)
+            unplaced = PoseWithCovariance(planar_pose(math.nan, math.nan, 0.0), UNKNOWN_COVARIANCE)
+            twist = TwistWithCovariance(_twist(value.twist), UNKNOWN_COVARIANCE)
             self._push(Kind.BASE_ODOM, at_ns, Odometry(header, BASE_FRAME, unplaced, twist))
         elif isinstance(value, BaseReport):
             self._push(Kind.BASE_STATUS, at_ns, value.status)

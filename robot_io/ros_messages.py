@@ -240,7 +240,8 @@ TF_MESSAGE = CdrType(TFMessage, TFMessage.__ros_name__)
 LOG = CdrType(Log, Log.__ros_name__)
 DIAGNOSTIC_ARRAY = CdrType(DiagnosticArray, DiagnosticArray.__ros_name__)
 
-ZERO_COVARIANCE = (0.0,) * 36
+UNKNOWN_COVARIANCE = (0.0,) * 36
+"""All zero says nothing of the covariance, as ROS has it (nav_msgs/Odometry)."""
 
 
 def ros_time(time_ns: int) -> Time:

@@ -58,11 +58,6 @@ def encode_advertise(topic: str, type_name: str) -> bytes:
     )
 
 
-def encode_unadvertise(topic: str) -> bytes:
-    """Take back `encode_advertise`."""
-    return _json({"op": "unadvertise", "id": f"adv:{topic}", "topic": topic})
-
-
 def encode_subscribe(topic: str, type_name: str) -> bytes:
     """Ask for every message of `topic`; the server keeps at most the newest one when it is behind."""
     return _json(
@@ -75,11 +70,6 @@ def encode_subscribe(topic: str, type_name: str) -> bytes:
             "queue_length": 1,
         }
     )
-
-
-def encode_unsubscribe(topic: str) -> bytes:
-    """Take back `encode_subscribe`."""
-    return _json({"op": "unsubscribe", "id": f"sub:{topic}", "topic": topic})
 
 
 def encode_call(call_id: str, service: str, arguments: dict[str, str]) -> bytes:

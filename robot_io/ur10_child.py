@@ -177,9 +177,8 @@ def main() -> NoReturn:
         hold_arm(job, SharedRecord(job.record_fd, ARM_RECORD_BYTES))
     except PushError as error:
         _report(job, error_line(error))
-        _leave(
-            error.exit_code
-        )  # in here: after this block the error lets go of the frames that hold the wheel's objects
+        # In here: after this block the error lets go of the frames that hold the wheel's objects.
+        _leave(error.exit_code)
     except Exception as error:  # the last line of a process: whatever it was, the parent hears of it
         _report(job, error_line(DeviceError(f"the arm's process failed: {error!r}", where=job.host)))
         _leave(1)

@@ -55,8 +55,7 @@ def parse_url(url: str) -> WebSocketURI:
 class WebSocketLink:
     """A connected websocket; every method returns at once except `connect` (2 s) and `close` (0.05 s)."""
 
-    def __init__(self, uri: WebSocketURI, sock: socket.socket, protocol: ClientProtocol, clock: ClockNs) -> None:
-        self._uri = uri
+    def __init__(self, sock: socket.socket, protocol: ClientProtocol, clock: ClockNs) -> None:
         self._socket = sock
         self._protocol = protocol
         self._clock = clock
@@ -85,7 +84,7 @@ class WebSocketLink:
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
-        link = cls(uri, sock, ClientProtocol(uri), clock)
+        link = cls(sock, ClientProtocol(uri), clock)
         try:
             link._shake_hands(url)
         except BaseException:

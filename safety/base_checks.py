@@ -35,13 +35,13 @@ def check(
     settings: SafetySettings, state: SafetyState, inp: TickInput, control: ControlState
 ) -> tuple[SafetyState, list[str]]:
     """Return the state and the active faults of base, localisation and gate."""
-    faults = _of_link(settings, inp)
+    faults = _of_link(inp)
     state, pose_faults = _of_pose(settings, state, inp, control)
     state, motion_faults = _of_motion(settings, state, inp)
     return state, faults + pose_faults + motion_faults
 
 
-def _of_link(settings: SafetySettings, inp: TickInput) -> list[str]:
+def _of_link(inp: TickInput) -> list[str]:
     base = inp.base
     faults: list[str] = []
     if base.latched and base.latch_cause == Latch.LINK:

@@ -72,7 +72,7 @@ class FeedWriter:
         }
 
     def joint_states(self, topic: str, pose: Pose2D, twist: BodyTwist, t_ns: int) -> Message:
-        """sensor_msgs/JointState with joints x, y, yaw in the WORLD frame , not smoothed as the real one is."""
+        """sensor_msgs/JointState with joints x, y, yaw in the WORLD frame, not smoothed as the real one is."""
         cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
         velocity = [twist.vx * cosine - twist.vy * sine, twist.vx * sine + twist.vy * cosine, twist.omega]
         return {

@@ -183,7 +183,7 @@ STANDARD = [
             HEADER,
             "base_link",
             ros.PoseWithCovariance(POSE, tuple(float(i) for i in range(36))),
-            ros.TwistWithCovariance(TWIST, ros.ZERO_COVARIANCE),
+            ros.TwistWithCovariance(TWIST, ros.UNKNOWN_COVARIANCE),
         ),
     ),
     (ros.PATH, ros.Path(HEADER, (ros.PoseStamped(HEADER, POSE),) * 3)),

@@ -18,8 +18,6 @@ from robot_io.rosbridge_codec import (
     encode_call,
     encode_subscribe,
     encode_twist,
-    encode_unadvertise,
-    encode_unsubscribe,
     spell_type,
     type_fits,
 )
@@ -103,12 +101,6 @@ def test_advertise_subscribe_and_their_opposites():
         "queue_length": 1,
     }
     assert isinstance(subscribe["throttle_rate"], int)  # a float makes the server drop the subscription
-    assert json.loads(encode_unadvertise("/cmd_vel")) == {
-        "op": "unadvertise",
-        "id": "adv:/cmd_vel",
-        "topic": "/cmd_vel",
-    }
-    assert json.loads(encode_unsubscribe("/odom")) == {"op": "unsubscribe", "id": "sub:/odom", "topic": "/odom"}
 
 
 def test_service_call():

@@ -33,8 +33,7 @@ def ends() -> Iterator[tuple[WebSocketLink, socket.socket]]:
         theirs, _ = listener.accept()
     ours.setblocking(False)
     theirs.settimeout(2)
-    uri = parse_url(URL)
-    link = WebSocketLink(uri, ours, ClientProtocol(uri, state=State.OPEN), time.monotonic_ns)
+    link = WebSocketLink(ours, ClientProtocol(parse_url(URL), state=State.OPEN), time.monotonic_ns)
     with theirs:
         yield link, theirs
     link.abort()
