@@ -1,0 +1,25 @@
+"""The drivers keep the contract of `robot_io/driver.py` in their types as well: mypy reads this, nobody runs it."""
+
+from __future__ import annotations
+
+from robot_io.base_feed import BaseFeed
+from robot_io.driver import CommandedDriver, Driver
+from robot_io.ft300 import Ft300
+from robot_io.messages import BodyTwist, JointState, SensorWrench
+from robot_io.ridgeback import Ridgeback
+from robot_io.ur10 import Ur10
+from sim_backend.sim_ft300 import SimFt300
+from sim_backend.sim_ridgeback import SimRidgeback
+from sim_backend.sim_ur10 import SimUr10
+
+
+def sensors(real: Ft300, simulated: SimFt300) -> tuple[Driver[SensorWrench], ...]:
+    return real, simulated
+
+
+def arms(real: Ur10, simulated: SimUr10) -> tuple[Driver[JointState], ...]:
+    return real, simulated
+
+
+def bases(real: Ridgeback, simulated: SimRidgeback) -> tuple[CommandedDriver[BaseFeed, BodyTwist], ...]:
+    return real, simulated
