@@ -37,9 +37,11 @@ class FtConfig(Table, frozen=True):
     level: Level = "emulated"
     port: str = ""
     tare_seconds_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
+    """How long the tare is averaged, at 100 readings a second."""
     noise_force_N: NonNegative = 1.2
     """Noise of the sensor, one standard deviation of a force axis (FT 300 product sheet: 1.2 N)."""
     noise_torque_Nm: NonNegative = 0.03
+    """The same of a torque axis."""
 
 
 class ArmConfig(Table, frozen=True):
@@ -49,6 +51,7 @@ class ArmConfig(Table, frozen=True):
     host: str = ""
     hold: Literal["monitor", "servo"] = "monitor"
     held_pose_rad: Joints = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.3100)
+    """Joints for which `[frames]` is given; an arm that is elsewhere is refused (R04)."""
     held_pose_tolerance_rad: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
     """How far the measured joints may be from `held_pose_rad` at start."""
 
@@ -58,6 +61,7 @@ class TopicsConfig(Table, frozen=True):
 
     ros_version: Literal[1, 2] = 1
     command: str = "/cmd_vel"
+    """Must pass the controller that stops the wheels after 0.25 s."""
     command_type: str = "geometry_msgs/Twist"
     odometry: str = "/odometry/filtered"
     odometry_type: str = "nav_msgs/Odometry"
@@ -71,6 +75,7 @@ class TopicsConfig(Table, frozen=True):
     status: str = "/mcu/status"
     status_type: str = "ridgeback_msgs/Status"
     slider_pose: str = ""
+    """Where motion capture sees the object; logged, never used for control."""
     slider_pose_type: str = "geometry_msgs/TransformStamped"
 
 
@@ -80,7 +85,9 @@ class BaseConfig(Table, frozen=True):
     level: Level = "emulated"
     url: str = ""
     pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
+    """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
+    """How often poses come: late after 3 periods, at least 50 ms, and lost after 6, at least 120 ms (F40)."""
     topics: TopicsConfig = TopicsConfig()
 
 
@@ -127,32 +134,50 @@ class ControlConfig(Table, frozen=True):
     push_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.1
     approach_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
     ramp_s: Annotated[float, Meta(ge=0.1, le=10)] = 1.0
+    """Time from rest to full speed, and back."""
     distance_m: Annotated[float, Meta(gt=0, le=1000)] = 2.0
+    """Along the path, from first contact to the contact point."""
     force_filter_tau_s: Annotated[float, Meta(ge=0, le=2)] = 0.05
+    """Time constant of the low-pass on the force; 0: none."""
     force_min_N: Annotated[float, Meta(gt=0, le=50)] = 5.0
+    """Below this horizontal force there is no contact."""
     contact_samples: Annotated[int, Meta(ge=1, le=100)] = 5
+    """So many readings in a row above `force_min_N` are contact."""
     heading_gain_per_s: Annotated[float, Meta(ge=0, le=5)] = 1.0
+    """Turn rate for each radian that the base has turned away from its heading at the start ..."""
     max_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=0.25)] = 0.1
+    """... and the most of it."""
     lost_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=1)] = 0.2
+    """Without contact the push turns back over the path this fast ..."""
     lost_time_s: Annotated[float, Meta(gt=0, le=10)] = 3.0
+    """... for at most this long ..."""
     lost_distance_m: Annotated[float, Meta(gt=0, le=2)] = 0.3
+    """... or this far, then the base holds ..."""
+    lost_rest_s: Annotated[float, Meta(gt=0, le=60)] = 2.0
+    """... and the run ends after this long at rest, unless the operator resumes."""
     retreat_m: Annotated[float, Meta(ge=0, le=0.2)] = 0.05
     """How far the base backs off after the push, so that the sensor can be checked out of contact (0: not at all)."""
-    lost_rest_s: Annotated[float, Meta(gt=0, le=60)] = 2.0
 
 
 class LimitsConfig(Table, frozen=True):
     """Limits of this rig; the program's own ceilings (`safety/limits.py`) may only be lowered."""
 
     max_force_N: Positive = 150.0
+    """Force beyond the tare, all three axes, at which the run stops (F50)."""
     slow_force_N: Positive = 100.0
+    """From here on half the speed."""
     max_torque_Nm: Positive = 20.0
+    """Torque beyond the tare at which the run stops (F51)."""
     envelope_factor: Annotated[float, Meta(gt=1, le=3)] = 1.5
+    """Commands may be this many times the push speed, never above 0.75 m/s."""
     max_acceleration_m_per_s2: Annotated[float, Meta(gt=0, le=2.5)] = 1.0
     max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
     max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
+    """Turned away this far from its heading at the start, the base stops (F44)."""
     hold_slow_rad: Positive = 0.005
+    """Drift of an arm joint at which the base holds ..."""
     hold_stop_rad: Positive = 0.01
+    """... and at which it stops (F20)."""
 
 
 class RigConfig(Table, frozen=True):

@@ -74,6 +74,7 @@ class WorldConfig(Table, frozen=True):
     """The simulated world, used at levels sim and emulated."""
 
     solver: Literal["exact", "osqp"] = "exact"
+    """The closed form, or the paper's program by OSQP (to 1e-6 the same, and much slower)."""
     ball_radius_m: Annotated[float, Meta(ge=0.001, le=0.2)] = 0.05
     """Radius of the contact ball."""
     slider: SliderConfig = SliderConfig()
@@ -81,7 +82,10 @@ class WorldConfig(Table, frozen=True):
     start: StartConfig = StartConfig()
     sensor: SensorModelConfig = SensorModelConfig()
     arm_rate_hz: Annotated[float, Meta(ge=20, le=125.5)] = 124.99
+    """Cycle of the emulated controller as a clock outside sees it."""
     arm_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.21
+    """Where in a period a device samples, so that no run tests one frozen phase; likewise the others."""
     base_tick_rate_error: Annotated[float, Meta(ge=-0.01, le=0.01)] = 0.0001
+    """Relative error of the base's clock (0.0001: 25.0025 Hz)."""
     base_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.53
     mocap_rate_hz: Annotated[float, Meta(ge=5, le=200)] = 100.007
