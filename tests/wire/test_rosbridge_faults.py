@@ -9,11 +9,12 @@ import time
 import pytest
 import websocket
 
-from robot_io.base_feed import BasePose, CommandEcho
+from robot_io.base_feed import BasePose, CommandEcho, SliderPose
 from robot_io.config import TopicsConfig
 from robot_io.messages import BodyTwist, LinkState, Pose2D
 from robot_io.ridgeback import FRESH_NS, LINK_STALE_NS, Ridgeback
 from robot_io.websocket_link import LinkLost, WebSocketLink
+from sim_backend.ridgeback_settings import DEFAULT_SLIDER_TOPIC
 from tests.wire.bridge_process import Bridge, running_bridge, until
 
 FORWARD = BodyTwist(0.1, 0.0, 0.0)
@@ -201,13 +202,20 @@ def test_nothing_that_moves_is_sent_when_nobody_drained_for_long(bridge: Bridge)
         assert base.health().counters["held_back"] == 0
 
 
-def test_occlusion_leaves_the_pose_out_and_keeps_the_link(bridge: Bridge):
-    with Ridgeback(bridge.url, topics=TOPICS) as base:
-        bridge.do("occlude_base", 0.4)
+@pytest.mark.parametrize(("fault", "kind"), [("occlude_base", BasePose), ("occlude_slider", SliderPose)])
+def test_occlusion_leaves_the_pose_out_and_keeps_the_link(bridge: Bridge, fault, kind):
+    with Ridgeback(bridge.url, topics=TopicsConfig(status="", slider_pose=DEFAULT_SLIDER_TOPIC)) as base:
         samples = []
+
+        def seen() -> int:
+            samples.extend(sample for sample in base.drain() if isinstance(sample.value, kind))
+            return len(samples)
+
+        assert until(lambda: seen() > 5)
+        bridge.do(fault, 0.4)
         end = time.monotonic() + 0.8
         while time.monotonic() < end:
-            samples += [sample for sample in base.drain() if isinstance(sample.value, BasePose)]
+            seen()
             time.sleep(0.005)
         gaps = [b.received_ns - a.received_ns for a, b in itertools.pairwise(samples)]
         assert max(gaps) > 300 * MS
