@@ -83,11 +83,11 @@ def test_no_word_of_the_program_names_a_command_that_is_not_there():
                 assert words in COMMANDS or words.split()[0] in COMMANDS, f"{source.name} names `push {words}`"
 
 
-def python_blocks():
-    return re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+def python_blocks(page):
+    return re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
 
 
-def test_readme_driver_snippets_work(tmp_path):
+def test_readme_driver_snippets_work():
     """Each driver alone, as the README shows it, against the emulators that `push emulate all` serves."""
     emulators = subprocess.Popen(
         [PUSH, "emulate", "all", "--base-port", "0", "--arm-host", "127.0.7.31", "--json"],
@@ -101,7 +101,7 @@ def test_readme_driver_snippets_work(tmp_path):
             where |= json.loads(line)
             if len(where) == 4:  # device, port, host, url
                 break
-        blocks = python_blocks()
+        blocks = python_blocks("README.md")
         assert len(blocks) == 3
         for block in blocks:
             code = block.replace("/dev/ttyUSB0", where["port"]).replace("192.168.131.40", where["host"])
@@ -116,3 +116,30 @@ def test_readme_driver_snippets_work(tmp_path):
         emulators.terminate()
         emulators.wait(10)
         emulators.stdout.close()
+
+
+def test_log_reading_snippets_work(tmp_path):
+    """The readers by others read every tick; as the page says, neither needs anything of this program."""
+    done = subprocess.run(
+        [PUSH, "run", "sim", "--fast", "--no-report", "--json", "--distance-m", "0.05", "--out", "runs/first"],
+        cwd=tmp_path, env=os.environ | {"XDG_STATE_HOME": str(tmp_path)},
+        capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
+    ticks = json.loads(done.stdout)["loop"]["ticks"]
+    blocks = python_blocks("docs/logs.md")
+    assert [re.search(r"mcap_ros2|rosbags", block)[0] for block in blocks] == ["mcap_ros2", "rosbags"]
+    for block in blocks:
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-P", "-c", block],
+            cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert len(done.stdout.splitlines()) == ticks
+
+
+def test_the_snippet_of_a_wire_fault_works():
+    [block] = python_blocks("docs/working-on-it.md")
+    done = subprocess.run(
+        [sys.executable, "-c", block], cwd=ROOT, capture_output=True, text=True, timeout=30, check=False
+    )
+    assert done.returncode == 0, done.stderr
