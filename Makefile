@@ -29,6 +29,8 @@ clean: ## remove the environment and all caches (runs/ stays)
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
+dev: ## set up with everything that tests and studies need
+
 runtime dev:
 	@command -v $(PYTHON) >/dev/null || { echo "set-up: no $(PYTHON) here: run \`sudo apt install python3 python3-venv\`" >&2; exit 2; }
 	@$(PYTHON) tools/bootstrap.py $@

@@ -19,7 +19,7 @@ try:
     from numba import njit
 except ImportError as error:
     raise EnvironmentFault(
-        "numba is not installed", where="sweep", do="Install it with: .venv/bin/pip install -e '.[sweep]'"
+        "numba is not installed", where="sweep", do="Run `make dev` in the program's folder"
     ) from error
 
 if TYPE_CHECKING:

@@ -40,7 +40,7 @@ def engine(name: str, scheduler: str | None) -> Iterator[None]:
         import distributed
     except ImportError:
         raise EnvironmentFault(
-            "dask.distributed is not installed", do="Install it with: .venv/bin/pip install -e '.[cluster]'"
+            "dask.distributed is not installed", do="Run `make dev` in the program's folder"
         ) from None
     import joblib
 
