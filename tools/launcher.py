@@ -125,6 +125,8 @@ class Launcher:
             elif event.get("event") == "latched" and event["latch"] != Latch.EOF:
                 self._gate_latch = event["text"]
                 self._live.say(f"gate: {event['text']}")
+            elif event.get("event") == "warning":
+                self._live.say(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
                 self._live.say(f"recorder: {event['what']}")
                 self._processes.tell_control(b"L")

@@ -407,3 +407,20 @@ def test_open_loop_loses_the_object(state, tmp_path, seed, host):
     assert summary["distance_m"] < 2.0
     _, wheels = world_of(tmp_path / "run" / "run.mcap")
     assert stands(wheels[-1][1])
+
+
+LATE_ADAPTER = """
+import sys
+if "tools.run.control_process" in sys.orig_argv:
+    from robot_io import ft300_line
+    ft300_line._milliseconds = lambda timer: 16
+"""
+
+
+def test_what_a_driver_warns_of_is_said(state, tmp_path):
+    """An adapter that delivers late must be mended by the operator, and its driver knows how."""
+    (tmp_path / "sitecustomize.py").write_text(LATE_ADAPTER)
+    with started(state, "run", "emulated", *QUICK, env={"PYTHONPATH": str(tmp_path)}, cwd=tmp_path) as run:
+        run.wait_for(r"ft300: .*delivers only every 16 ms .*udev rule")
+        run.signal(signal.SIGINT)
+        assert run.wait(20.0).code == 130

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import logging
 import os
 import select
 import signal
@@ -30,6 +31,18 @@ VERDICT_WITHIN_S = 60.0
 """The base stands already; this long a launcher that is held up (a stopped terminal) may take to listen again."""
 
 
+class DriverWarnings(logging.Handler):
+    """Passes on what the sensor's driver warns of (a USB adapter that delivers late): nobody sees our stderr."""
+
+    def __init__(self, status: StatusPipe) -> None:
+        super().__init__(logging.WARNING)
+        self._status = status
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Say it to the launcher."""
+        self._status.say("warning", text=f"ft300: {record.getMessage()}")
+
+
 def main() -> int:
     """Run the loop to its end; the exit code is the run's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -37,6 +50,7 @@ def main() -> int:
     die_with_parent(job.launcher_pid)
     set_timer_slack_1ns()
     status = StatusPipe(job.status_fd)
+    logging.getLogger("robot_io").addHandler(DriverWarnings(status))
     rig = rig_from_toml(job.rig_toml)
     sensor = Ft300(job.ft_port)
     try:
