@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from tests.push_runs import blame_the_host
 from tools.cli import COMMANDS
 from tools.fault_table import table
 from tools.rig_reference import reference
+from tools.run.run_facts import PROGRAM_VERSION
 
 ROOT = Path(__file__).parents[2]
 PUSH = Path(sys.executable).parent / "push"
@@ -31,6 +33,11 @@ def test_rig_reference_is_current():
 
 def test_fault_table_is_current():
     assert table() in (ROOT / "docs/safety.md").read_text(), "paste the output of python -m tools.fault_table"
+
+
+def test_the_version_is_the_same_everywhere():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["version"] == PROGRAM_VERSION
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
