@@ -55,6 +55,13 @@ def bridge():
         yield running
 
 
+def test_a_bridge_that_falls_silent_is_given_up_although_nothing_is_commanded(bridge: Bridge):
+    with Ridgeback(bridge.url, topics=TOPICS) as base:
+        bridge.do("freeze", 2.0)
+        assert until(lambda: base.drain() == () and base.health().state == LinkState.LOST, seconds=1.5)
+        assert base.health().cause == "no message from the bridge for 0.3 s"
+
+
 def test_a_frozen_bridge_gets_nothing_old_to_deliver(bridge: Bridge):
     base = Ridgeback(bridge.url, topics=TOPICS)
     closing: list[int] = []
