@@ -318,6 +318,18 @@ def test_plain_slashes_and_naggling_server():
         assert gather_until(base, CommandEcho, FORWARD).value == CommandEcho(FORWARD)
 
 
+def test_a_naggling_server_is_not_kept_waiting():
+    """Acknowledged late, its next message would wait: some twenty in two seconds for more than 40 ms (measured)."""
+    with running_bridge(bridge={"nagle": True}) as bridge, Ridgeback(bridge.url, topics=QUICK) as base:
+        arrivals: set[int] = set()
+        end = time.monotonic() + 2.0
+        while time.monotonic() < end:
+            arrivals |= {sample.received_ns for sample in base.drain()}
+            time.sleep(0.001)
+    late = [b - a for a, b in itertools.pairwise(sorted(arrivals)) if b - a > 35_000_000]
+    assert len(late) < 8, late
+
+
 def test_stop_and_close_are_idempotent_and_need_no_link():
     base = Ridgeback("ws://127.0.0.1:1")
     base.stop()
