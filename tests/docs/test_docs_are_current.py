@@ -9,6 +9,7 @@ import re
 import shlex
 import subprocess
 import sys
+import textwrap
 import time
 import tomllib
 from pathlib import Path
@@ -19,8 +20,10 @@ from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import blame_the_host
 from tools.cli import COMMANDS
 from tools.fault_table import table
+from tools.rig import resolve_rig
 from tools.rig_reference import reference
 from tools.run.run_facts import PROGRAM_VERSION
+from tools.study.grid import load_grid
 
 ROOT = Path(__file__).parents[2]
 PUSH = Path(sys.executable).parent / "push"
@@ -45,6 +48,25 @@ def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
         if not target.startswith("http"):
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def examples(page, beginning):
+    """Return the indented blocks of a page that begin with these words, without their indentation."""
+    blocks = re.findall(r"(?:^ {4,}.*\n|^\n(?= {4}))+", (ROOT / page).read_text(), re.M)
+    return [text for block in blocks if (text := textwrap.dedent(block).strip()).startswith(beginning)]
+
+
+@pytest.mark.parametrize("page", ["docs/rig-files.md", "docs/first-push-on-the-robot.md"])
+def test_rigs_of_the_pages_are_good(page, tmp_path):
+    [text] = examples(page, "extends = ")
+    (tmp_path / "example.toml").write_text(text)
+    resolve_rig(tmp_path / "example.toml")
+
+
+def test_the_grid_of_the_page_is_good(tmp_path):
+    [text] = examples("docs/simulation-studies.md", "name = ")
+    (tmp_path / "example.toml").write_text(text)
+    assert len(load_grid(tmp_path / "example.toml", {}).cases) == 3 * 3 * 100
 
 
 def readme_commands():
