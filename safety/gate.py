@@ -15,6 +15,7 @@ import msgspec
 
 from robot_io.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
+from safety.settings import SafetySettings
 
 ZERO = BodyTwist()
 
@@ -85,6 +86,14 @@ class GateLimits(msgspec.Struct, frozen=True, gc=False):
     acceleration: float
     turn_acceleration: float
     period_ns: int
+
+    @classmethod
+    def of(cls, settings: SafetySettings) -> GateLimits:
+        """Return the limits of the envelope: what passed it passes the gate."""
+        envelope = settings.envelope
+        return cls(
+            envelope.speed, envelope.turn_rate, envelope.acceleration, envelope.turn_acceleration, settings.period_ns
+        )
 
 
 class GateState(msgspec.Struct, frozen=True, gc=False):

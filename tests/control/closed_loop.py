@@ -46,10 +46,7 @@ class ClosedLoop:
         self.tick = 0
         self.operator = Operator.NONE
         self.gate = GateState()
-        limits = self.core.safety.envelope
-        self._gate_limits = GateLimits(
-            limits.speed, limits.turn_rate, limits.acceleration, limits.turn_acceleration, PERIOD_NS
-        )
+        self._gate_limits = GateLimits.of(self.core.safety)
         self._ft_period_ns = 1e9 / ft_rate_hz
         self._ft_delay_ns = round(ft_delay_ms * 1e6)
         self._ft_burst_ns = ft_burst_ms * 1_000_000

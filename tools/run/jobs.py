@@ -18,7 +18,6 @@ class ControlJob(msgspec.Struct, frozen=True):
     base_record_fd: int
     arm_record_fd: int
     ring_fd: int
-    alive_fd: int
     operator_fd: int
     status_fd: int
     gate_pidfd: int
@@ -34,5 +33,4 @@ class EmulatorJob(msgspec.Struct, frozen=True):
     devices: tuple[str, ...]
     launcher_pid: int
     ring_fd: int
-    alive_fd: int
     status_fd: int

@@ -25,7 +25,6 @@ from robot_io.gate_log import GateLog
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety import gate
 from safety.gate import GateLimits, GateState
-from safety.settings import SafetySettings
 from sim_backend.rig_settings import ridgeback_settings
 from sim_backend.sim_ft300 import SimFt300
 from sim_backend.sim_ridgeback import SimRidgeback
@@ -82,11 +81,7 @@ class Lockstep:
         )
         self._core = TickCore.of(rig, in_contact=saved is not None)
         self._state = first_state(saved)
-        settings = SafetySettings.of(rig)
-        limits = settings.envelope
-        self._gate_limits = GateLimits(
-            limits.speed, limits.turn_rate, limits.acceleration, limits.turn_acceleration, settings.period_ns
-        )
+        self._gate_limits = GateLimits.of(self._core.safety)
         self._gate = GateState()
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
         self._record = BaseRecord()

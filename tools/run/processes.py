@@ -87,7 +87,7 @@ class Processes:
         if not emulated:
             return []
         ring_fd, alive_fd = self._rings["world"].fd, self._alive["world"][1]
-        job = EmulatorJob(rig_to_toml(self._rig), self._seed, emulated, os.getpid(), ring_fd, alive_fd, -1)
+        job = EmulatorJob(rig_to_toml(self._rig), self._seed, emulated, os.getpid(), ring_fd, -1)
         self._spawn("emulators", "tools.run.emulator_process", job, [ring_fd, alive_fd])
         return ["emulators"]
 
@@ -160,15 +160,7 @@ class Processes:
         self._spawn("recorder", "tools.recorder", job, [*(ring.fd for ring in rings), *alive])
 
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
-        settings = SafetySettings.of(rig)
-        envelope = settings.envelope
-        limits = GateLimits(
-            envelope.speed,
-            envelope.turn_rate,
-            envelope.acceleration,
-            envelope.turn_acceleration,
-            settings.period_ns,
-        )
+        limits = GateLimits.of(SafetySettings.of(rig))
         ring_fd = self._rings["gate"].fd
         job = GateJob(rig.base, rig.frames, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns)
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
@@ -201,7 +193,6 @@ class Processes:
             base_fd,
             arm_fd,
             ring_fd,
-            alive_fd,
             operator_fd,
             -1,
             *pidfds,
