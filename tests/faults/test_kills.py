@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import time
@@ -145,6 +146,23 @@ def test_all_devices_gone_at_once(state, tmp_path, host):
     faults = set(found.ended.last_object["faults"])
     assert faults & {"F30", "F02", "F24-stop", "F69"}
     assert [note for note in found.ended.last_object["notes"] if "emulators" in note]
+
+
+@repeated_when_the_host_stalls
+def test_nobody_but_control_ends_the_gate_and_the_recorder(state, tmp_path, host):
+    """Whoever signals all processes of a run would cut the base's last zeros, and the log."""
+    argv = ("run", "emulated", *QUICK, "--distance-m", "0.2", "--out", str(tmp_path / "run"), "--json")
+    with started(state, *argv, host=host) as run:
+        run.wait_for("APPROACH|PUSH ")
+        pids = json.loads((tmp_path / "run" / "processes.json").read_text())
+        for name in ("gate", "recorder"):
+            for number in (signal.SIGINT, signal.SIGTERM):
+                os.kill(pids[name], number)
+        ended = run.wait()
+        run.wait_gone(3.0)
+    assert ended.code == 0, ended.err
+    assert ended.last_object["notes"] == []
+    replays(tmp_path / "run")
 
 
 BROKEN_FOLD = """

@@ -1,4 +1,4 @@
-"""What a process of ours does first: it dies with its parent, even with one that was gone before it could ask for it."""
+"""What a process of ours does first: it dies with its parent, even with one that was gone before it could ask."""
 
 import os
 import select
