@@ -38,7 +38,7 @@ OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
 LOG_LOST = b"L"[0]
 """The launcher says that the recorder cannot write any more: as good as gone."""
 MAX_READINGS = 64
-"""More packets than this in one tick (half a second of them) are a flood; the oldest go."""
+"""More packets than this in one tick (0.64 s of them) are a flood; the oldest go."""
 
 Fold = Callable[[TickState, TickInput], tuple[TickState, TickOutput]]
 
