@@ -1,4 +1,4 @@
-"""Entry of the `push` program: makes sure that `control`, `safety` and `tools` are ours before anything runs.
+"""Entry of the `push` program: makes sure that `control` and its other folders are ours before anything runs.
 
 The program's folders are top-level packages, and python-control (a common library) is called `control` too. The
 checkout therefore goes first on the path, here and in every child process; if a foreign module is in the
