@@ -9,9 +9,9 @@ import time
 import pytest
 import websocket
 
-from robot_io.base_feed import BasePose, CommandEcho, SliderPose
+from robot_io.base_feed import BaseFeed, BasePose, CommandEcho, SliderPose
 from robot_io.config import TopicsConfig
-from robot_io.messages import BodyTwist, LinkState, Pose2D
+from robot_io.messages import BodyTwist, LinkState, Pose2D, Stamped
 from robot_io.ridgeback import FRESH_NS, LINK_STALE_NS, Ridgeback
 from robot_io.websocket_link import LinkLost, WebSocketLink
 from sim_backend.ridgeback_settings import DEFAULT_SLIDER_TOPIC
@@ -259,6 +259,30 @@ def test_lag_shows_in_the_stamps(bridge: Bridge):
         normal = pose_age(base)
         bridge.do("lag", 0.09)
         assert until(lambda: pose_age(base) > normal + 0.06)
+        assert base.health().state == LinkState.UP
+
+
+def test_poses_that_jitter_come_late_by_different_times_and_in_order():
+    with running_bridge({"mocap_jitter_s": 0.008}) as bridge, Ridgeback(bridge.url, topics=TOPICS) as base:
+        poses: list[Stamped[BaseFeed]] = []
+
+        def seen() -> int:
+            poses.extend(sample for sample in base.drain() if isinstance(sample.value, BasePose))
+            return len(poses)
+
+        assert until(lambda: seen() >= 100, every_s=0.0005)
+    late_s = sorted(pose.received_ns * 1e-9 - pose.device_time_s for pose in poses)
+    assert late_s[90] - late_s[10] > 0.003
+    stamps = [pose.device_time_s for pose in poses]
+    assert stamps == sorted(stamps)
+
+
+def test_the_clocks_of_robot_and_laptop_need_not_agree():
+    with running_bridge({}, {"clock_skew_s": 30.0}) as bridge, Ridgeback(bridge.url, topics=TOPICS) as base:
+        seen = [sample for sample in base.drain() if isinstance(sample.value, BasePose)]
+        assert abs(seen[-1].device_time_s - time.time() - 30.0) < 5.0
+        drive(base, 0.3)
+        assert moving(bridge.heard(), 0)
         assert base.health().state == LinkState.UP
 
 
