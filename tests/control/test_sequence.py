@@ -17,6 +17,13 @@ def resume(inp, _=0):
     return replace(no_force(inp), operator=int(Operator.RESUME))
 
 
+def carried_to(bench, **place):
+    """Put the base elsewhere as if it had gone there: safety knows the place, so that it is no jump."""
+    bench.pose = replace(bench.pose, **place)
+    moved = {f"pose_{key}": value for key, value in place.items()}
+    bench.state = replace(bench.state, safety=replace(bench.state.safety, **moved))
+
+
 def velocity(bench):
     twist = bench.output.wanted_world
     return twist.vx, twist.vy
@@ -160,7 +167,7 @@ def test_the_push_ramps_from_the_speed_of_the_approach_in_a_second():
 def test_the_law_steers_in_the_world():
     """Force 0.2 rad to the left, 0.1 m right of the path, k_f 0.3, k_y 0.2: 1.3 x 0.2 - 0.2 x 0.1 = 0.24 rad."""
     bench = pushing(("control.force_filter_tau_s=0",))
-    bench.pose = replace(bench.pose, y=-0.1)
+    carried_to(bench, y=-0.1)
     bench.force_path = (15.0 * math.cos(0.2), 15.0 * math.sin(0.2))
     bench.fold()
     assert bench.state.control.lateral_m == pytest.approx(-0.1, abs=1e-12)
@@ -172,7 +179,7 @@ def test_the_law_steers_in_the_world():
 
 def test_the_world_velocity_is_turned_by_the_measured_heading_and_the_heading_held():
     bench = pushing()
-    bench.pose = replace(bench.pose, yaw=0.04)
+    carried_to(bench, yaw=0.04)
     bench.fold()
     wanted = bench.output.wanted_body
     theta_p = bench.state.control.theta_p
@@ -180,7 +187,7 @@ def test_the_world_velocity_is_turned_by_the_measured_heading_and_the_heading_he
         (0.1 * math.cos(theta_p - 0.04), 0.1 * math.sin(theta_p - 0.04)), abs=1e-12
     )
     assert wanted.omega == pytest.approx(-0.04, abs=1e-12)
-    bench.pose = replace(bench.pose, yaw=-0.08)
+    carried_to(bench, yaw=-0.08)
     bench.fold()
     assert bench.output.wanted_body.omega == pytest.approx(0.08, abs=1e-12)
 
@@ -518,3 +525,57 @@ def test_the_fold_is_pure():
     first, again = bench.core.fold(state, inp), bench.core.fold(state, inp)
     assert first == again
     assert state == bench.state
+
+
+# --- a pose that jumps -------------------------------------------------------------------------------------------
+
+
+def jumped(x=0.0, y=0.0, yaw=0.0):
+    def alter(inp, _=0):
+        pose = inp.base.pose
+        return replace(inp, base=replace(inp.base, pose=Pose2D(pose.x + x, pose.y + y, pose.yaw + yaw)))
+
+    return alter
+
+
+@pytest.mark.parametrize("jump", [{"x": 3.0}, {"x": -3.0}, {"y": 3.0}, {"yaw": 0.07}])
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_pose_that_jumps_is_not_used(jump, samples):
+    """Up to two samples in a row are left out (the third stops the run): nothing is steered, reached or lost by them."""
+    bench, same = pushing(), pushing()
+    for n in range(samples):
+        bench.fold(jumped(**jump), n)
+        assert bench.output.faults == ()
+        assert bench.state.control.phase == Phase.PUSH
+        # At most what the base has gone since the last good pose is missing.
+        same.fold()
+        assert bench.state.control.progress_m == pytest.approx(same.state.control.progress_m, abs=0.003)
+        assert bench.state.control.theta_p == pytest.approx(same.state.control.theta_p, abs=1e-4)
+        assert velocity(bench) == pytest.approx(velocity(same), abs=1e-4)
+        assert bench.output.command_body.omega == pytest.approx(0.0, abs=1e-4)
+    bench.run_until(lambda b: b.output.finished)
+    assert bench.output.exit_code == 0
+    assert bench.state.control.end_progress_m >= 2.0
+
+
+def test_a_jump_in_the_approach_is_no_missed_object():
+    bench = FoldBench().run_to(Phase.APPROACH)
+    bench.fold(jumped(x=1.0))
+    assert bench.state.control.phase == Phase.APPROACH
+    bench.run_until(lambda b: b.output.finished)
+    assert bench.output.exit_code == 0
+
+
+def test_between_two_poses_a_rejected_one_stays_rejected():
+    """The feed may be slower than the loop: until the next pose comes, the newest record is still the jumped one."""
+    bench = pushing()
+    bench.fold(jumped(x=3.0))
+    seq, at_ns = bench.inp.base.pose_seq, bench.inp.base.pose_received_ns
+    for n in range(3):
+        again = lambda inp, _: replace(  # noqa: E731
+            jumped(x=3.0)(inp), base=replace(jumped(x=3.0)(inp).base, pose_seq=seq, pose_received_ns=at_ns)
+        )
+        bench.fold(again, n)
+        assert bench.state.control.phase == Phase.PUSH
+        assert bench.state.safety.pose_jumps == 1
+        assert bench.output.faults == ()

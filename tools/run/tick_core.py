@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import msgspec
+from msgspec.structs import replace
 
 from control.settings import Settings
 from control.step import step
@@ -10,6 +11,7 @@ from robot_io.config import RigConfig
 from robot_io.messages import BodyTwist, WorldTwist
 from robot_io.tick import ControlTick, EnvelopeState, Mode, TickInput, TickOutput, TickState
 from safety import envelope
+from safety.base_checks import trusted_pose
 from safety.settings import SafetySettings
 from safety.supervisor import give_up, note_command, supervise
 
@@ -41,7 +43,9 @@ class TickCore(msgspec.Struct, frozen=True):
                 True,
                 verdict.exit_code,
             )
-        control, wanted = step(self.control, state.control, inp, held=state.safety.mode == Mode.HOLD)
+        pose = trusted_pose(self.safety, state.safety, inp.base)
+        seen = inp if pose is inp.base.pose else replace(inp, base=replace(inp.base, pose=pose))
+        control, wanted = step(self.control, state.control, seen, held=state.safety.mode == Mode.HOLD)
         clamped = state.envelope.clamped
         safety, verdict = supervise(self.safety, state.safety, inp, control, wanted.body, clamped)
         new_envelope, command = envelope.apply(self.safety.envelope, state.envelope, wanted.body, verdict.mode)
