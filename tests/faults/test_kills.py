@@ -226,6 +226,36 @@ def test_control_frozen_before_its_first_tick(state, tmp_path):
     assert "control process was killed by SIGKILL" in error["what"]
 
 
+TERMINATED_AS_THE_STREAM_BEGINS = """
+import sys
+if "tools.run.control_process" in sys.orig_argv:
+    import os, signal
+    from pathlib import Path
+    from robot_io.ft300 import Ft300
+    start, close = Ft300.start, Ft300.close
+    def close_and_say_so(self):
+        close(self)
+        Path(CLOSED).touch()
+    def start_and_be_told_to_end(self):
+        start(self)
+        Ft300.close = close_and_say_so
+        os.kill(os.getpid(), signal.SIGTERM)
+    Ft300.start = start_and_be_told_to_end
+"""
+
+
+def test_control_told_to_end_while_it_opens_the_sensor_leaves_no_stream(state, tmp_path):
+    closed = tmp_path / "closed"
+    (tmp_path / "sitecustomize.py").write_text(f"CLOSED = {str(closed)!r}\n{TERMINATED_AS_THE_STREAM_BEGINS}")
+    argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
+    with started(state, *argv, env={"PYTHONPATH": str(tmp_path)}) as run:
+        ended = run.wait(40.0)
+        run.wait_gone(3.0)
+    assert ended.code != 0
+    assert "Traceback" not in ended.err
+    assert closed.exists()
+
+
 ENDLESS_FOLD = """
 import sys
 if "tools.run.control_process" in sys.orig_argv:

@@ -53,13 +53,6 @@ def main() -> int:
     logging.getLogger("robot_io").addHandler(DriverWarnings(status))
     rig = rig_from_toml(job.rig_toml)
     sensor = Ft300(job.ft_port)
-    try:
-        info = sensor.open()
-        sensor.start()
-    except PushError as error:
-        sensor.close()
-        status.error(error)
-        return error.exit_code
     core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = BaseLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
@@ -76,7 +69,18 @@ def main() -> int:
         operator_fd=job.operator_fd,
         on_status=lambda inp, state, output: status.say("status", **status_line(inp, state, output)),
     )
-    signal.signal(signal.SIGTERM, lambda *_: loop.stop_requested())
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    try:
+        info = sensor.open()
+        sensor.start()
+        signal.signal(signal.SIGTERM, lambda *_: loop.stop_requested())
+    except PushError as error:
+        sensor.close()
+        status.error(error)
+        return error.exit_code
+    except SystemExit:  # told to end meanwhile: a stream that has begun is not left running
+        sensor.close()
+        raise
     status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
     if not _wait_for_go(job.operator_fd, sensor):
         base.close()
