@@ -177,6 +177,8 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     frozen_run: int = 0
     last_ft_force: Vector3 = (0.0, 0.0, 0.0)
     last_ft_torque: Vector3 = (0.0, 0.0, 0.0)
+    arm_packets: int = 0
+    """How many packets of the arm have been judged."""
     arm_velocity_run: int = 0
     overspeed_run: int = 0
     overspeed_seq: int = 0

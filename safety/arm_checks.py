@@ -14,7 +14,7 @@ STALE_HOLD_NS = 40_000_000
 """Five packets of the controller; 25 ms were seen on a loaded loopback."""
 STALE_STOP_NS = 100_000_000
 MAX_JOINT_SPEED_RAD_PER_S = 0.02
-JOINT_SPEED_TICKS = 2
+JOINT_SPEED_PACKETS = 2
 
 ROBOT_MODE_RUNNING = 7
 """UR RTDE guide: robot_mode."""
@@ -62,11 +62,13 @@ def check(
         faults.append("F20-hold")
     if any(abs(q - p) > settings.held_pose_tolerance for q, p in zip(joints.position, settings.held_pose, strict=True)):
         faults.append("R04")
-    run = state.arm_velocity_run + 1 if max(map(abs, joints.velocity)) > MAX_JOINT_SPEED_RAD_PER_S else 0
-    if run >= JOINT_SPEED_TICKS:
+    run = state.arm_velocity_run
+    if arm.packets != state.arm_packets:
+        run = run + 1 if max(map(abs, joints.velocity)) > MAX_JOINT_SPEED_RAD_PER_S else 0
+    if run >= JOINT_SPEED_PACKETS:
         faults.append("F21")
     faults += _of_modes(settings, inp)
-    return replace(state, arm_velocity_run=run), faults
+    return replace(state, arm_packets=arm.packets, arm_velocity_run=run), faults
 
 
 def _of_modes(settings: SafetySettings, inp: TickInput) -> list[str]:

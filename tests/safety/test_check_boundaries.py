@@ -151,6 +151,19 @@ def test_a_moving_joint_counts_when_it_goes_on(sign):
     assert after.arm_velocity_run == 0
 
 
+def test_a_joint_speed_counts_once_however_often_its_packet_is_read():
+    """The arm speaks 125 times a second; a loop of 500 Hz sees each packet four times."""
+    state, fast = SafetyState(), first(0.03)
+    for _ in range(4):
+        state, found = arm_checks.check(SETTINGS, state, with_arm(velocity=fast, packets=7), TARED)
+        assert (state.arm_velocity_run, found) == (1, [])
+    state, found = arm_checks.check(SETTINGS, state, with_arm(velocity=fast, packets=8), TARED)
+    assert (state.arm_velocity_run, found) == (2, ["F21"])
+    state, found = arm_checks.check(SETTINGS, state, with_arm(packets=8), TARED)
+    assert found == ["F21"]  # not forgotten by the same packet, whatever it says
+    assert arm_checks.check(SETTINGS, state, with_arm(packets=9), TARED)[1] == []
+
+
 @pytest.mark.parametrize(
     ("key", "rows"), [("published_ns", ("F24-hold", "F24-stop")), ("changed_ns", ("F25-hold", "F25-stop"))]
 )
