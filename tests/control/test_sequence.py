@@ -541,7 +541,7 @@ def jumped(x=0.0, y=0.0, yaw=0.0):
 @pytest.mark.parametrize("jump", [{"x": 3.0}, {"x": -3.0}, {"y": 3.0}, {"yaw": 0.07}])
 @pytest.mark.parametrize("samples", [1, 2])
 def test_a_pose_that_jumps_is_not_used(jump, samples):
-    """Up to two samples in a row are left out (the third stops the run): nothing is steered, reached or lost by them."""
+    """Up to two samples in a row are left out (the third stops the run): nothing is steered or reached by them."""
     bench, same = pushing(), pushing()
     for n in range(samples):
         bench.fold(jumped(**jump), n)

@@ -227,6 +227,15 @@ def test_a_run_that_failed_before_any_contact(ran, ticks, tmp_path):
     assert "R02" in seen.words["td"]
 
 
+@pytest.mark.parametrize(("seen", "why"), [(True, "The force did not come back"), (False, "No contact was felt")])
+def test_why_a_push_failed_without_and_after_a_contact(ran, ticks, tmp_path, seen, why):
+    last = ticks[-1]
+    control = replace(last.after.control, contact_seen=seen, phase=int(Phase.FAILED))
+    ended = replace(last, after=replace(last.after, control=control), output=replace(last.output, exit_code=6))
+    log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), [*ticks[:-1], ended])
+    assert verdict(read_run(log)).why.startswith(why)
+
+
 def test_a_log_that_ends_in_the_middle_of_a_push(ran, ticks, tmp_path):
     pushing = [i for i, tick in enumerate(ticks) if tick.after.control.phase == Phase.PUSH]
     log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), ticks[: pushing[len(pushing) // 2]])

@@ -15,7 +15,7 @@ from safety.faults import FAULTS
 from tools.report.bounded_series import Floats
 from tools.report.run_data import RunData
 from tools.report.style import phase_spans
-from tools.run.verdict import VERDICTS
+from tools.run.verdict import VERDICTS, lost
 
 
 class Verdict(NamedTuple):
@@ -50,7 +50,7 @@ def verdict(run: RunData) -> Verdict:
         return Verdict(f"Pushed {distance}", f"Lateral error at the end: {lateral}.", True)
     name = VERDICTS.get(last.output.exit_code, "error")
     if not why:
-        why = "the force did not come back" if name == "contact lost" else "see the safety events"
+        why = lost(last.after.control.contact_seen) if name == "contact lost" else "see the safety events"
     return Verdict(
         f"{name.capitalize()} after {distance}", f"{why.capitalize()}. Lateral offset at the end: {lateral}.", False
     )

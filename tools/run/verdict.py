@@ -89,8 +89,13 @@ def why(summary: dict[str, Any]) -> str:
     faults = stopping["faults"] if stopping else summary["faults"]
     reasons = [FAULTS[i].text for i in faults if i in FAULTS and FAULTS[i].mode >= Mode.HOLD]
     if not reasons and summary["verdict"] == "contact lost":
-        return "the force did not come back" if summary["contact_seen"] else "nothing was met"
+        return lost(summary["contact_seen"])
     return "; ".join(reasons) or summary["verdict"]
+
+
+def lost(contact_seen: bool) -> str:
+    """Return why a push failed without contact; an object too light to be felt may have been there all the same."""
+    return "the force did not come back" if contact_seen else "no contact was felt"
 
 
 def _counts(counts: dict[str, int]) -> str:
