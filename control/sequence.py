@@ -156,7 +156,7 @@ def _push(settings: Settings, state: ControlState, inp: TickInput, contact: tupl
         return _enter(state, Phase.REST, inp.now_ns, speed=0.0)
     elapsed_s = (inp.now_ns - state.ramp_since_ns) * S
     speed = push_speed(
-        elapsed_s, state.ramp_from_speed, control.push_speed_m_per_s, control.ramp_s, max(remaining, 0.001)
+        elapsed_s, state.ramp_from_speed, control.push_speed_m_per_s, settings.ramp_s, max(remaining, 0.001)
     )
     if not touching:
         return _without_force(settings, state, inp, contact, speed)

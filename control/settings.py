@@ -20,6 +20,8 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     contact_y: float
     """Contact ball centre in the BODY frame, m."""
     expected_contact_m: float
+    ramp_s: float
+    """Duration of the push's ramps, s: the rig's, or longer where its acceleration limit needs it."""
     period_s: float
     """Period of the loop, s."""
     tare_readings: int
@@ -38,6 +40,7 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
             contact_x,
             contact_y,
             rig.path.expected_contact_m,
+            max(rig.control.ramp_s, rig.control.push_speed_m_per_s / rig.limits.max_acceleration_m_per_s2),
             1.0 / rig.loop.rate_hz,
             round(100 * rig.ft.tare_seconds_s),
             in_contact,

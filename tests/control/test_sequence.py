@@ -417,6 +417,15 @@ def test_the_push_ends_on_its_distance_rests_retreats_and_checks_the_sensor():
     assert (bench.output.exit_code, bench.output.faults) == (0, ())
 
 
+def test_the_push_ends_on_its_distance_where_the_acceleration_limit_is_below_the_ramp():
+    """0.3 m/s in 0.1 s is 3 m/s^2 and the rig allows 0.2: from there the base needs 22 cm to stand."""
+    short = ("control.push_speed_m_per_s=0.3", "control.ramp_s=0.1", "limits.max_acceleration_m_per_s2=0.2")
+    bench = FoldBench((*short, "control.distance_m=1"))
+    bench.run_until(lambda b: b.output.finished)
+    assert bench.output.exit_code == 0
+    assert 1.0 <= bench.state.control.end_progress_m < 1.01
+
+
 def test_a_rig_may_do_without_the_retreat():
     bench = pushing(("control.retreat_m=0",))
     bench.run_until(lambda b: b.output.finished)
