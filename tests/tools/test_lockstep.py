@@ -15,11 +15,15 @@ from pathlib import Path
 import pytest
 
 from robot_io.clock import SIM_EPOCH_NS
+from robot_io.log_channels import CHANNELS, Kind
 from robot_io.mcap_read import read_log, read_summary
+from robot_io.messages import BodyTwist
 from robot_io.tick import TICK_CDR
 from robot_io.world_messages import STATE_CDR
 from tests.replay.runs import PUSH, ROOT, push
-from tools.run.lockstep import WallPace
+from tools.rig import resolve_rig
+from tools.run.lockstep import Lockstep, WallPace
+from tools.run.tick_core import TickCore
 
 SHORT = ("run", "sim", "--fast", "--distance-m", "0.1", "--no-report")
 
@@ -96,6 +100,38 @@ def test_the_operators_stop_ends_a_paced_run_with_130_and_a_whole_log(tmp_path):
     assert max(abs(tick.output.command_body.vx) for tick in ticks) > 0.0
     assert ticks[-1].output.command_body.vx == ticks[-1].output.command_body.vy == 0.0
     assert ticks[-1].output.finished
+
+
+def test_an_exception_in_a_tick_stops_the_base_and_is_named_in_the_log(monkeypatch):
+    """As in the loop of a wall-clock run: zero, F68, and the error goes on to whoever runs it."""
+    fold = TickCore.fold
+
+    def broken(self, state, inp):
+        if state.control.progress_m > 0.01 and not inp.host.loop_error:
+            raise ArithmeticError("planted by a test")
+        return fold(self, state, inp)
+
+    monkeypatch.setattr(TickCore, "fold", broken)
+    ticks, sent = [], []
+
+    class Kept:
+        def record(self, kind, time_ns, payload):
+            if kind == Kind.GATE_SENT:
+                sent.append(CHANNELS[Kind.GATE_SENT].cdr_type.decode(payload).twist.linear)
+
+        def tick(self, time_ns, payload, tick):
+            ticks.append(tick)
+
+    one = Lockstep(resolve_rig("sim", ()), 0, Kept())
+    with pytest.raises(ArithmeticError, match="planted by a test"):
+        one.run(lambda *_: None)
+    *_, before, last = ticks
+    assert before.output.command_body != BodyTwist()
+    assert (last.output.faults, last.output.exit_code, last.output.finished) == (("F68",), 1, True)
+    assert last.output.command_body == BodyTwist()
+    assert last.before == before.after
+    assert one.notes.fault_counts == {"F68": 1}
+    assert (sent[-2].x > 0.04, sent[-1].x, sent[-1].y) == (True, 0.0, 0.0)
 
 
 def test_pacing_keeps_the_rate_and_never_bursts_after_a_pause(monkeypatch):

@@ -129,14 +129,21 @@ class Lockstep:
             self._arm.read() or ArmRecord(),
             self._record,
         )
-        before = self._state
-        after, output = self._core.fold(before, inp)
-        self._send(tick, now_ns, output)
-        message = tick_message(inp, before, after, output)
-        self._log.tick(now_ns, TICK_CDR.encode(message), message)
+        try:
+            after, output = self._core.fold(self._state, inp)
+        except Exception:  # as in the loop: the base gets zero and the log says so; the error is for whoever runs this
+            failed = replace(inp, host=replace(inp.host, loop_error=True))
+            self._conclude(failed, *self._core.fold(self._state, failed))
+            raise
+        self._conclude(inp, after, output)
+        return inp, output
+
+    def _conclude(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
+        self._send(inp.tick, inp.now_ns, output)
+        message = tick_message(inp, self._state, after, output)
+        self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
         self._state = after
         self.notes.note(inp, output)
-        return inp, output
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
         """Pass the command through the gate's judgement, as the gate process does."""
