@@ -168,10 +168,10 @@ def _push(settings: Settings, state: ControlState, inp: TickInput, contact: tupl
         theta_p = push_law.push_angle(theta_f, state.lateral_m, control.k_f, control.k_y_rad_per_m)
     else:
         theta_p = open_loop.push_angle()
-    if abs(theta_p) <= BACKWARD_RAD:
-        return replace(state, theta_f=theta_f, theta_p=theta_p, speed=speed, backward_ticks=0)
-    # Beyond 90 degrees the law would pull: the direction stays as it was and safety counts the ticks (F56).
-    return replace(state, theta_f=theta_f, speed=speed, backward_ticks=state.backward_ticks + 1)
+    if abs(theta_p) > BACKWARD_RAD:
+        # Beyond 90 degrees the law would pull: the direction stays as it was and safety counts the ticks (F56).
+        return replace(state, theta_f=theta_f, speed=speed, backward_ticks=state.backward_ticks + 1)
+    return replace(state, theta_f=theta_f, theta_p=theta_p, speed=speed, backward_ticks=0)  # no number: F58 at once
 
 
 def _without_force(

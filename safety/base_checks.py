@@ -6,7 +6,6 @@ import math
 
 from msgspec.structs import replace
 
-from robot_io.base_record import BaseRecord
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, Mode, SafetyState, TickInput
 from safety.gate import Latch
@@ -43,17 +42,27 @@ def check(
     return state, faults + pose_faults + motion_faults
 
 
-def trusted_pose(settings: SafetySettings, state: SafetyState, base: BaseRecord) -> Pose2D:
-    """Return the pose that control may use: the newest one, or the last good one while the newest is a jump (F41)."""
-    return Pose2D(state.pose_x, state.pose_y, state.pose_yaw) if _jumps(settings, state, base) else base.pose
+def trusted_pose(settings: SafetySettings, state: SafetyState, inp: TickInput) -> Pose2D:
+    """Return the pose that control may use: the newest, or the last good one while that is none (F42) or a jump (F41).
+
+    Before there was a good one it is the newest, whatever it is.
+    """
+    if not state.pose_seq or (_usable(inp) and not _jumps(settings, state, inp)):
+        return inp.base.pose
+    return Pose2D(state.pose_x, state.pose_y, state.pose_yaw)
 
 
-def _jumps(settings: SafetySettings, state: SafetyState, base: BaseRecord) -> int:
-    """Return how many poses in a row, with this record, are further off than the base can have moved."""
+def _usable(inp: TickInput) -> bool:
+    pose = inp.base.pose
+    return inp.base.pose_valid and math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)
+
+
+def _jumps(settings: SafetySettings, state: SafetyState, inp: TickInput) -> int:
+    """Return how many poses in a row, with this usable one, are further off than the base can have moved."""
+    base, pose = inp.base, inp.base.pose
     if base.pose_seq == state.pose_seq:
         return state.pose_jumps
-    pose = base.pose
-    if not state.pose_seq or not _finite(pose):  # nothing to compare with yet, or no pose at all (F42)
+    if not state.pose_seq:  # nothing to compare with yet
         return 0
     time_s = (base.pose_received_ns - state.pose_ns) * 1e-9
     moved = math.hypot(pose.x - state.pose_x, pose.y - state.pose_y)
@@ -61,10 +70,6 @@ def _jumps(settings: SafetySettings, state: SafetyState, base: BaseRecord) -> in
     speed, turn = settings.envelope.speed * OVERSPEED_FACTOR, settings.envelope.turn_rate * OVERSPEED_FACTOR
     far = moved > JUMP_M + speed * time_s or turned > JUMP_RAD + turn * time_s
     return state.pose_jumps + 1 if far else 0
-
-
-def _finite(pose: Pose2D) -> bool:
-    return math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)
 
 
 def _of_link(inp: TickInput) -> list[str]:
@@ -97,10 +102,10 @@ def _of_pose(
         faults.append("F40-stop")
     elif age_ns > max(POSE_SLOW_PERIODS * settings.pose_period_ns, POSE_SLOW_FLOOR_NS):
         faults.append("F40-slow")
-    if not (base.pose_valid and _finite(pose)):
+    if not _usable(inp):
         return state, [*faults, "F42"]
     if base.pose_seq != state.pose_seq:
-        jumps = _jumps(settings, state, base)
+        jumps = _jumps(settings, state, inp)
         # A jump keeps the old reference, so that a pose that stays away is counted again and again.
         if jumps == 0:
             state = replace(state, pose_x=pose.x, pose_y=pose.y, pose_yaw=pose.yaw, pose_ns=base.pose_received_ns)

@@ -588,3 +588,14 @@ def test_between_two_poses_a_rejected_one_stays_rejected():
         assert bench.state.control.phase == Phase.PUSH
         assert bench.state.safety.pose_jumps == 1
         assert bench.output.faults == ()
+
+
+@pytest.mark.parametrize("bad", [{"pose": Pose2D(math.nan, 0.0, math.nan)}, {"pose_valid": False}])
+def test_a_pose_that_is_none_leaves_the_figures_of_the_run_as_they_were(bad):
+    """The stop is for safety (F42); how far the push came, and that nothing pulled backward, is still to be told."""
+    bench = pushing()
+    progress, lateral = bench.state.control.progress_m, bench.state.control.lateral_m
+    bench.run_until(lambda b: b.output.finished, lambda inp, _: replace(inp, base=replace(inp.base, **bad)))
+    assert bench.output.faults == ("F42",)
+    assert bench.state.control.progress_m == pytest.approx(progress, abs=0.0011)
+    assert bench.state.control.lateral_m == pytest.approx(lateral, abs=1e-4)

@@ -43,7 +43,7 @@ class TickCore(msgspec.Struct, frozen=True):
                 True,
                 verdict.exit_code,
             )
-        pose = trusted_pose(self.safety, state.safety, inp.base)
+        pose = trusted_pose(self.safety, state.safety, inp)
         seen = inp if pose is inp.base.pose else replace(inp, base=replace(inp.base, pose=pose))
         control, wanted = step(self.control, state.control, seen, held=state.safety.mode == Mode.HOLD)
         clamped = state.envelope.clamped
