@@ -426,6 +426,17 @@ def test_the_push_ends_on_its_distance_where_the_acceleration_limit_is_below_the
     assert 1.0 <= bench.state.control.end_progress_m < 1.01
 
 
+@pytest.mark.parametrize("phase", [Phase.REST, Phase.CHECK])
+def test_at_rest_the_heading_is_left_alone(phase):
+    """Nothing may move while it rests, in contact or out of it: a heading that is off is held only on the way."""
+    bench = pushing()
+    bench.run_until(lambda b: b.state.control.phase == phase)
+    carried_to(bench, yaw=0.04)
+    bench.fold()
+    assert bench.state.control.phase == phase
+    assert bench.output.wanted_body == BodyTwist()
+
+
 def test_a_rig_may_do_without_the_retreat():
     bench = pushing(("control.retreat_m=0",))
     bench.run_until(lambda b: b.output.finished)
