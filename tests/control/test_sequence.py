@@ -233,6 +233,18 @@ def test_a_moment_beyond_90_degrees_is_forgiven():
     assert bench.output.faults == ()
 
 
+def test_a_lost_force_begins_the_count_of_backward_ticks_anew():
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+    for _ in range(2):
+        bench.force_path = (15.0 * math.cos(1.4), 15.0 * math.sin(1.4))
+        for _ in range(19):
+            bench.fold()
+        bench.fold(no_force)
+        assert bench.state.control.phase == Phase.LOST
+        assert bench.state.control.backward_ticks == 0
+    assert bench.output.faults == ("F52",)
+
+
 def test_just_below_90_degrees_is_pushed():
     bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
     angle = math.radians(69.0)  # 1.3 x 69 = 89.7
