@@ -25,7 +25,6 @@ NORMAL_OR_REDUCED = 0b11
 SAFETY_NORMAL, SAFETY_REDUCED = 1, 2
 SAFETY_EMERGENCY = (6, 7)
 """UR RTDE guide: safety_mode, which says the same as the bits and is believed as well."""
-PROTECTIVE_STOP, SAFEGUARD_STOP = 1 << 2, 1 << 4
 EMERGENCY = (1 << 5) | (1 << 6) | (1 << 7)
 ANY_STOP = 0b11111111100
 """UR RTDE guide: safety_status_bits, bits 2 to 10."""
