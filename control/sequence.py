@@ -34,7 +34,9 @@ def advance(
     """
     along = settings.path.along(*contact)
     progress = along - state.contact_from_m if state.contact_seen else 0.0
-    state = replace(state, progress_m=progress, lateral_m=settings.path.lateral(*contact))
+    lateral = settings.path.lateral(*contact)
+    if math.isfinite(progress) and math.isfinite(lateral):  # before the first good pose they are not
+        state = replace(state, progress_m=progress, lateral_m=lateral)
     state = _note_rest(state, inp)
     phase = Phase(state.phase)
     if held and phase in (Phase.APPROACH, Phase.PUSH, Phase.LOST):

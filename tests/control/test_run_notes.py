@@ -1,13 +1,15 @@
 """What a run says of itself: changes of faults, how often each came, and the figures of its end."""
 
+import json
 import math
 
 import pytest
 from msgspec.structs import replace
 
 from control.run_notes import MOST_EVENTS, RunNotes, outcome
+from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, Mode, Phase, TickState
-from tests.safety.fold_bench import PERIOD_NS, pushing
+from tests.safety.fold_bench import PERIOD_NS, FoldBench, pushing
 
 
 def noted(*ticks):
@@ -57,3 +59,16 @@ def test_the_figures_of_the_end(phase):
     checked = outcome(bench.inp, TickState(replace(control, residual_N=0.5)), bench.output)
     assert checked["residual_N"] == 0.5
     assert not math.isnan(checked["residual_N"])
+
+
+def test_a_run_that_never_had_a_pose_still_has_figures_that_are_numbers():
+    """A mocap that says null from the start: R01, and a summary that JSON can hold."""
+    bench = FoldBench()
+    nowhere = Pose2D(math.nan, math.nan, math.nan)
+    bench.run_until(
+        lambda b: b.output.finished, lambda inp, _: replace(inp, base=replace(inp.base, pose=nowhere, pose_valid=False))
+    )
+    found = outcome(bench.inp, bench.state, bench.output)
+    assert (found["exit_code"], found["faults"]) == (4, ["R01"])
+    assert (found["distance_m"], found["lateral_error_m"]) == (0.0, 0.0)
+    json.dumps(found, allow_nan=False)
