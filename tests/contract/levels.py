@@ -73,9 +73,6 @@ class Simulated:
     def let_pass(self, seconds: float) -> None:
         self._clock.advance_to(self._clock() + round(seconds * 1e9))
 
-    def break_link(self) -> None:
-        pytest.skip("a simulated device has no link")
-
     def freeze(self) -> contextlib.AbstractContextManager[None]:
         return contextlib.nullcontext()  # time stands still between two drains anyway
 
