@@ -1,4 +1,4 @@
-"""Does the push itself make sense: start, contact, direction, numbers?"""
+"""Does the push itself make sense: start, rest, contact, direction, numbers?"""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Phase, TickInput
 
 START_NS = 5_000_000_000
+RESTLESS_NS = 5_000_000_000
+"""A base that was told to stand is at rest within one; a motion still read then is none, or not ours."""
+STANDING = (Phase.REST, Phase.CHECK, Phase.LOST_HOLD)
 BACKWARD_TICKS = 20
 RESIDUAL_N = 5.0
 """The product sheet's own threshold for a force that means something."""
@@ -23,6 +26,11 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
         faults.append("R01")
     if phase == Phase.TARE and control.refusal:
         faults.append(_REFUSALS[control.refusal])
+    if not control.rest_since_ns and inp.now_ns - control.phase_since_ns > RESTLESS_NS:
+        if phase == Phase.TARE:
+            faults.append("R05")
+        elif phase in STANDING:
+            faults.append("F39")
     if phase == Phase.LOST:
         faults.append("F52")
     if phase == Phase.LOST_HOLD:

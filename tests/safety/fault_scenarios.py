@@ -142,9 +142,14 @@ def approaching_in_vain() -> FoldBench:
     return bench
 
 
-def checking() -> FoldBench:
-    bench = pushing()
-    bench.run_until(lambda b: b.state.control.phase == Phase.RETREAT)
+def pushed(phase: Phase) -> FoldBench:
+    """Return a bench that has pushed its distance and come to a phase behind that."""
+    return pushing().run_to(phase)
+
+
+def lost_for_good() -> FoldBench:
+    bench = pushing(UNFILTERED)
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, without_contact)
     return bench
 
 
@@ -172,6 +177,8 @@ def alternate_torque(inp: TickInput, n: int) -> TickInput:
     return reading(torque=(21.0 + BIAS[3], BIAS[4] + 0.001 * n, BIAS[5]))(inp, n)
 
 
+CREEPS = base(odometry=BodyTwist(0.015, 0.0, 0.0))
+"""Above what counts as rest, below what counts as moving (F34) or as ignoring the command (F33)."""
 NAN = math.nan
 SERVO = ('arm.hold="servo"',)
 BUSY = {
@@ -189,6 +196,7 @@ SCENARIOS = [
         lambda: FoldBench(("ft.noise_force_N=0", "ft.noise_torque_Nm=0")).run_to(Phase.TARE), warm=99,
         also=frozenset({"R02"}),
     ),
+    Scenario("R05", "odometry creeps", CREEPS, lambda: FoldBench().run_to(Phase.TARE), warm=500),
     Scenario("R04", "arm elsewhere", moved_joint(0.051), FoldBench, warm=19),
     # --- force-torque sensor
     Scenario("F01-slow", "silent", ft(readings=())),
@@ -207,7 +215,8 @@ SCENARIOS = [
         for i in range(3) for sign in (1.0, -1.0)
     ),
     Scenario("F07", "while pushing", pressed(340.0), also=frozenset({"F50-stop"})),
-    Scenario("F09", "drifted", lambda inp, _: with_force(inp, (BIAS[0] + 6.0, BIAS[1], BIAS[2])), checking,
+    Scenario("F09", "drifted", lambda inp, _: with_force(inp, (BIAS[0] + 6.0, BIAS[1], BIAS[2])),
+             lambda: pushed(Phase.RETREAT),
              also=frozenset({"F06"})),
     Scenario("F10", "NaN", reading(force=(NAN, 0.0, 0.0)), also=frozenset({"F52"})),
     Scenario("F10", "infinite", reading(force=(0.0, -math.inf, 0.0)), also=frozenset({"F52"})),
@@ -255,6 +264,10 @@ SCENARIOS = [
     Scenario("F36", "approach beyond the envelope", without_contact, approaching_too_fast),
     Scenario("F38", "stop pressed", base(status=BaseStatus(True, True, 26.0))),
     Scenario("F38", "motors off", base(status=BaseStatus(False, False, 26.0))),
+    Scenario("F39", "creeps after the push", CREEPS, lambda: pushed(Phase.REST), warm=500),
+    Scenario("F39", "creeps while the zero is checked", CREEPS, lambda: pushed(Phase.CHECK), warm=500),
+    Scenario("F39", "creeps after the force was lost", then(CREEPS, without_contact), lost_for_good, warm=500,
+             also=frozenset({"F52-hold"})),
     Scenario("F40-slow", "silent", old("base", "pose_received_ns")),
     Scenario("F40-stop", "silent", old("base", "pose_received_ns")),
     Scenario("F41", "away", shifted_pose(x=0.5)),
