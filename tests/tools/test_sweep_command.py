@@ -351,6 +351,18 @@ def test_foreign_finished_and_unwritable_folders_are_refused_untouched(tmp_path,
     assert push(capsys, grid, "--out", "/proc/nowhere")[0] == 2
 
 
+def workers_of(pid):
+    """Return the process ids of joblib's workers below `pid`."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    started = {int(child): Path(f"/proc/{child}/cmdline").read_bytes() for child in children}
+    return [child for child, words in started.items() if b"popen_loky" in words]
+
+
+def ignores(pid, number):
+    mask = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("SigIgn"))
+    return bool(int(mask.split()[1], 16) >> (number - 1) & 1)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_leaves_a_resumable_state_and_no_process(tmp_path, capsys, stop):
@@ -371,6 +383,10 @@ def test_a_stop_leaves_a_resumable_state_and_no_process(tmp_path, capsys, stop):
             assert child.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.02)
+        workers = workers_of(child.pid)
+        assert len(workers) == 2
+        # Not theirs to hear: one that waits for its next item would die of it with a traceback.
+        assert all(ignores(pid, signal.SIGINT) for pid in workers)
         if stop == signal.SIGINT:
             os.killpg(child.pid, stop)  # as a terminal does
         else:

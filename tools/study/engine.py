@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
@@ -80,8 +81,9 @@ def run_items(
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     pool: Any = joblib.Parallel(
-        n_jobs=workers if local else -1, batch_size=1, return_as="generator_unordered", pre_dispatch="2*n_jobs"
-    )
+        n_jobs=workers if local else -1, batch_size=1, return_as="generator_unordered", pre_dispatch="2*n_jobs",
+        **({"initializer": _leave_ctrl_c_to_parent} if local else {}),
+    )  # fmt: skip
     with warnings.catch_warnings():
         # leaving early is meant: joblib warns that it cancels what is under way
         warnings.simplefilter("ignore", UserWarning)
@@ -98,6 +100,11 @@ def run_items(
             raise
         finally:
             results.close()
+
+
+def _leave_ctrl_c_to_parent() -> None:
+    """Ignore SIGINT in a worker: a terminal sends it there too, and one that waits for work would print a traceback."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _numbered(function: Callable[[Item], Result], number: int, item: Item) -> tuple[int, Result]:
