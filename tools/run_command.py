@@ -8,7 +8,7 @@ from typing import Any
 
 from robot_io.config import RigConfig
 from robot_io.error_report import exit_code_matters_more, say_json, tell
-from robot_io.errors import EnvironmentFault, UsageError
+from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, resolve_rig
@@ -161,7 +161,12 @@ def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTa
 
     text = run_dir.write_config(out, rig)
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
-    one = Lockstep(rig, args.seed, log, saved=saved)
+    try:
+        one = Lockstep(rig, args.seed, log, saved=saved)
+    except PushError:  # a world that cannot be: nothing has begun
+        log.abandon()
+        run_dir.discard(out)
+        raise
     stop_on_signals(one)
     live = LiveLine(rig, quiet=args.fast)
     pace = WallPace(1.0 / rig.loop.rate_hz)

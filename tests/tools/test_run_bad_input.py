@@ -72,6 +72,12 @@ def test_settings_that_cannot_be(state, tmp_path, setting, words):
     assert [word for word in words if word not in told] == []
 
 
+@pytest.mark.parametrize("controller", ["force", "open-loop"])
+def test_a_world_that_cannot_be_leaves_nothing_behind(state, tmp_path, controller):
+    argv = ("sim", "--fast", "--controller", controller, "--set", "world.floor.push_height_m=2")
+    assert "tips over" in push_fails(state, tmp_path, 2, *argv)["what"]
+
+
 def test_a_rig_file_with_two_mistakes_names_both_with_their_lines(state, tmp_path):
     rig = tmp_path / "mine.toml"
     rig.write_text('extends = "emulated"\nname = "mine"\n[control]\nkf = 0.1\ndistance_m = -2\n')

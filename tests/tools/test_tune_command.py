@@ -5,6 +5,7 @@ import json
 import pytest
 
 from robot_io.config import load_rig
+from robot_io.errors import ConfigError
 from sim_backend.gain_limits import PushedBody, fast_loop_k_f, limit
 from tools import cli
 from tools.run.gain_warning import gain_warning
@@ -130,3 +131,10 @@ def test_run_warns_for_the_whole_range_of_sliders_that_the_rig_assumes():
 def test_a_range_of_sliders_upside_down_is_refused(capsys):
     assert cli.main(["run", "sim", "--fast", "--set", "sliders.shortest_m=0.6"]) == 2
     assert "sliders.shortest_m must not be above sliders.longest_m" in capsys.readouterr().err
+
+
+def test_sliders_that_would_all_tip_over_are_no_reason_to_fail():
+    """Pushed at 2 m nothing of the range stays upright: then there is nothing to warn of."""
+    assert gain_warning(load_rig("thing", ["world.floor.push_height_m=2"])) is None
+    with pytest.raises(ConfigError, match="tips over"):
+        gain_warning(load_rig("sim", ["world.floor.push_height_m=2"]))

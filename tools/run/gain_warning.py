@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
 
 from robot_io.config import RigConfig
 from robot_io.errors import ConfigError
@@ -10,16 +10,19 @@ from sim_backend.assumed_sliders import pushed_body, samples
 from sim_backend.floor import FloorEffects
 from sim_backend.gain_limits import WARN_SHARE, PushedBody, limit
 from sim_backend.scene import slider_model
-from sim_backend.slider import Circle, Pressure, Rectangle
+from sim_backend.slider import Circle, Rectangle
 from tools.rig import devices_at
 
 
 def gain_warning(rig: RigConfig) -> str | None:
-    """Return one sentence if a rig's gains are beyond 0.7 of the limit for a slider it may meet, else None."""
-    control = rig.control
-    if control.controller != "force":
+    """Return one sentence if a rig's gains are beyond 0.7 of the limit for a slider it may meet, else None.
+
+    Raises ConfigError when the simulated slider cannot be.
+    """
+    control, bodies = rig.control, _bodies(rig)
+    if control.controller != "force" or not bodies:
         return None
-    highest = limit(_bodies(rig), control.k_f)
+    highest = limit(bodies, control.k_f)
     if control.k_y_rad_per_m <= WARN_SHARE * highest:
         return None
     told = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
@@ -29,23 +32,21 @@ def gain_warning(rig: RigConfig) -> str | None:
     )
 
 
-def _bodies(rig: RigConfig) -> Iterator[PushedBody]:
-    """Give the sliders of `[sliders]`, and the simulated one where there is one."""
-    world = rig.world
+def _bodies(rig: RigConfig) -> list[PushedBody]:
+    """Return the sliders of `[sliders]`, and the simulated one where there is one."""
+    world, pressure = rig.world, rig.sliders.pressure
     effects = FloorEffects(
         shift_m=world.slider.floor_friction * world.floor.push_height_m,
         turning=world.floor.turning,
         along_over_across=world.floor.along_over_across,
     )
-    assumed: list[tuple[Circle | Rectangle, Pressure]] = []
+    bodies = []
     for length in samples(rig.sliders.shortest_m, rig.sliders.longest_m):
-        assumed += [(Rectangle(length, length), rig.sliders.pressure), (Circle(length / 2), rig.sliders.pressure)]
+        for outline in (Rectangle(length, length), Circle(length / 2)):
+            with contextlib.suppress(ConfigError):  # it would tip over: nobody pushes that one so high
+                bodies.append(pushed_body(outline, pressure, effects, world.ball_radius_m))
     if not devices_at(rig, "hardware"):
         shape = slider_model(world.slider).shape
         assert isinstance(shape, Circle | Rectangle)
-        assumed.append((shape, world.slider.pressure))
-    for outline, pressure in assumed:
-        try:
-            yield pushed_body(outline, pressure, effects, world.ball_radius_m)
-        except ConfigError:  # it would tip over: nobody pushes that one so high
-            continue
+        bodies.append(pushed_body(shape, world.slider.pressure, effects, world.ball_radius_m))
+    return bodies
