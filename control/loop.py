@@ -15,13 +15,12 @@ from typing import Protocol
 from control.pacer import wake
 from control.run_notes import RunNotes
 from control.timing import LoopTiming
-from robot_io.arm_record import ArmRecord
-from robot_io.base_link import BaseLink
 from robot_io.clock import ClockNs, monotonic_ns
-from robot_io.event_loop import EventLoop, Timer
-from robot_io.log_channels import Kind
-from robot_io.messages import BodyTwist, DeviceHealth, LinkState, SensorWrench, Stamped
-from robot_io.ring import Ring
+from robot_io.ipc.event_loop import EventLoop, Timer
+from robot_io.ipc.gate_link import GateLink
+from robot_io.ipc.ring import Ring
+from robot_io.log.channels import Kind
+from robot_io.messages import ArmRecord, BodyTwist, DeviceHealth, LinkState, SensorWrench, Stamped
 from robot_io.tick import (
     TICK_CDR,
     ControlTick,
@@ -86,7 +85,7 @@ class ControlLoop:
         rate_hz: float,
         sensor: Sensor,
         arm: Arm,
-        base: BaseLink,
+        base: GateLink,
         ring: Ring,
         watch: Watch,
         operator_fd: int,

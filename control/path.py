@@ -9,7 +9,7 @@ import math
 
 import msgspec
 
-from robot_io.config import PathConfig
+from robot_io.rig.config import PathConfig
 
 
 class StraightPath(msgspec.Struct, frozen=True, gc=False):

@@ -7,9 +7,9 @@ import math
 from msgspec.structs import replace
 
 from control.settings import Settings
+from control.tare import add
 from control.wrench import force_on_slider_world, low_pass
-from robot_io.ft300_tare import TareSums, add
-from robot_io.tick import ControlState, FtReading, Phase
+from robot_io.tick import ControlState, FtReading, Phase, TareSums
 
 VALID_FOR_NS = 100_000_000
 """The force is valid while the newest packet is younger than this."""

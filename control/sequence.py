@@ -10,9 +10,9 @@ from control import open_loop, push_law
 from control.sensing import in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
-from robot_io.ft300_tare import TareSums, judge
+from control.tare import judge
 from robot_io.messages import LinkState
-from robot_io.tick import ControlState, Operator, Phase, TickInput
+from robot_io.tick import ControlState, Operator, Phase, TareSums, TickInput
 
 FRESH_NS = 100_000_000
 SETTLE_PACKETS = 20

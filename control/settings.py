@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 
 from control.path import StraightPath
-from robot_io.config import ControlConfig, FtConfig, RigConfig
-from robot_io.config_types import Matrix3
+from robot_io.rig.config import ControlConfig, FtConfig, RigConfig
+from robot_io.rig.types import Matrix3
 
 
 class Settings(msgspec.Struct, frozen=True, gc=False):

@@ -7,7 +7,6 @@ way all the same, one sentence says so and the exit code is 3.
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 import os
 import sys
@@ -17,6 +16,16 @@ from robot_io.errors import EnvironmentFault, OperatorStop
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("control", "safety", "sim_backend", "tools")
+
+
+def check_checkout() -> None:
+    """Raise EnvironmentFault where robot_io was installed as a library, without the application around it."""
+    if not (ROOT / "tools" / "cli.py").is_file():
+        raise EnvironmentFault(
+            "only the library `robot_io` is installed here, and `push` runs from a checkout of the project",
+            where=str(ROOT),
+            do="Clone the project and run `make demo` in it; the drivers work without it: `from robot_io import Ft300`",
+        )
 
 
 def put_root_first() -> None:
@@ -45,14 +54,14 @@ def check_packages() -> None:
 
 def main() -> int:
     """Run the `push` program; return its exit code."""
-    put_root_first()
     try:
+        check_checkout()
+        put_root_first()
         check_packages()
-        # By name: robot_io stands alone, and only this entry starts the layer above it.
-        program = importlib.import_module("tools.cli")
+        from tools import cli  # after the checks: only then it is this program's, and not someone else's `tools`
     except (EnvironmentFault, KeyboardInterrupt) as ended:
         from robot_io.error_report import report
 
         error = ended if isinstance(ended, EnvironmentFault) else OperatorStop("stopped by the operator")
         return report(error, as_json="--json" in sys.argv)
-    return int(program.main(sys.argv[1:]))
+    return cli.main(sys.argv[1:])

@@ -9,11 +9,12 @@ All are frozen, built of floats, ints and tuples, in SI units.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 import msgspec
 
 T = TypeVar("T")
+_NAN = float("nan")
 
 
 class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
@@ -112,3 +113,129 @@ class DeviceHealth(msgspec.Struct, frozen=True, gc=False):
     cause: str
     counters: dict[str, int]
     rate_hz: float
+
+
+class BasePose(msgspec.Struct, frozen=True, gc=False, tag=True):
+    """Pose of the base in the WORLD frame. `flaw` says why it is not usable ("" when it is)."""
+
+    pose: Pose2D
+    flaw: str = ""
+
+    @property
+    def valid(self) -> bool:
+        """Whether the pose may be used."""
+        return not self.flaw
+
+
+class BaseOdometry(msgspec.Struct, frozen=True, gc=False, tag=True):
+    """Measured velocity in the BODY frame; NaN where the message held null."""
+
+    twist: BodyTwist
+
+
+class BaseReport(msgspec.Struct, frozen=True, gc=False, tag=True):
+    """What the base's microcontroller says of stops, motors and battery."""
+
+    status: BaseStatus
+
+
+class SliderPose(msgspec.Struct, frozen=True, gc=False, tag=True):
+    """Pose of the pushed object in the WORLD frame, from motion capture: for the log, never for control."""
+
+    pose: Pose2D
+    flaw: str = ""
+
+
+class CommandEcho(msgspec.Struct, frozen=True, gc=False, tag=True):
+    """A velocity heard on the base's own command topic, ours or another's: proof that commands get there."""
+
+    twist: BodyTwist
+
+
+BaseFeed = BasePose | BaseOdometry | BaseReport | SliderPose | CommandEcho
+
+
+ZERO_JOINTS: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class ArmError(IntEnum):
+    """What the arm's process found wrong, for the log and the operator; safety judges the data itself."""
+
+    NONE = 0
+    LINK_LOST = 1
+    """The RTDE connection is gone."""
+    TIME_WENT_BACK = 2
+    """The controller's clock jumped back: it was restarted."""
+    NOT_FINITE = 3
+    """The newest packet holds NaN or infinity; passed on as it is, and over with the next good packet."""
+    SERVO_STOPPED = 4
+    """Active holding ended by itself: the control script no longer runs, or refused the target."""
+    SERVO_NOT_HOLDING = 5
+    """Active holding was given up: the joints were too far from the held target."""
+    SERVO_STALE = 6
+    """Active holding was given up: no new packet for too long."""
+
+
+class ArmRecord(msgspec.Struct, frozen=True, gc=False):
+    """Newest state of the arm: joints (rad, rad/s), times in CLOCK_MONOTONIC ns, 0 where there is none yet."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/ArmRecord"
+    joints: JointState = JointState(ZERO_JOINTS, ZERO_JOINTS, -1, 0, 0, 0, 0, 0.0, 0.0)
+    joint_modes: tuple[int, int, int, int, int, int] = (0, 0, 0, 0, 0, 0)
+    """Mode of each joint (253: running)."""
+    packets: int = 0
+    """How many packets of the controller were seen; the sequence number of `joints`."""
+    published_ns: int = 0
+    """When this record was written."""
+    changed_ns: int = 0
+    """When the controller's time stamp was last seen to change."""
+    link: int = 0
+    """A `LinkState`."""
+    error: int = 0
+    """An `ArmError`."""
+    servo: bool = False
+    """The arm is held actively (`hold = "servo"`) and so far without a fault."""
+    child_pid: int = 0
+
+
+NO_ARM = ArmRecord()
+"""What a reader holds before the first record."""
+
+
+class BaseRecord(msgspec.Struct, frozen=True, gc=False):
+    """Newest state of the base: m, rad, m/s, rad/s; times in CLOCK_MONOTONIC ns, 0 where there is none yet."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/BaseRecord"
+    pose: Pose2D = Pose2D(_NAN, _NAN, _NAN)
+    """Pose of the base (not of its markers) in the WORLD frame."""
+    pose_valid: bool = False
+    """False: the newest pose message was no usable pose (null, no unit quaternion, another frame)."""
+    pose_received_ns: int = 0
+    pose_seq: int = 0
+    """Counts pose messages, valid or not."""
+    odometry: BodyTwist = BodyTwist(_NAN, _NAN, _NAN)
+    """Measured velocity in the BODY frame; NaN where the message held null."""
+    odometry_received_ns: int = 0
+    odometry_seq: int = 0
+    status: BaseStatus = BaseStatus(False, False, _NAN)
+    status_received_ns: int = 0
+    newest_inbound_ns: int = 0
+    """When the newest message of any topic arrived."""
+    newest_pong_ns: int = 0
+    """When the bridge last answered a ping: proves its I/O thread only."""
+    accepted_seq: int = 0
+    """Sequence number of the last frame of control that the gate accepted."""
+    verdict: int = 0
+    """The gate's verdict on the newest frame it read (0: accepted)."""
+    sent: BodyTwist = BodyTwist()
+    """What really went out last."""
+    sent_ns: int = 0
+    latched: bool = False
+    """The gate sends nothing but zero until it is restarted."""
+    latch_cause: int = 0
+    published_ns: int = 0
+    """When this record was written."""
+
+
+NO_BASE = BaseRecord()
+"""What a reader holds before the first record."""

@@ -12,14 +12,12 @@ from typing import Annotated, ClassVar
 
 import msgspec
 
-from robot_io.arm_record import ArmRecord
-from robot_io.base_record import BaseRecord
-from robot_io.cdr import CdrType
-from robot_io.ft300_tare import TareSums
-from robot_io.messages import BodyTwist, WorldTwist
+from robot_io.cdr.cdr_type import CdrType
+from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, WorldTwist
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
+_ZERO6: Vector6 = (0.0,) * 6
 U32 = Annotated[int, "uint32"]
 
 
@@ -65,6 +63,23 @@ class Operator(IntEnum):
     NONE = 0
     STOP = 1
     RESUME = 2
+
+
+class TareSums(msgspec.Struct, frozen=True, gc=False):
+    """Sums of samples and of their squares (N, N*m, SENSOR frame): all, the first quarter, the last quarter.
+
+    All are of the difference to the first sample (`origin`), so that a large bias costs no digits.
+    """
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/TareSums"
+    count: int = 0
+    origin: Vector6 = _ZERO6
+    total: Vector6 = _ZERO6
+    squares: Vector6 = _ZERO6
+    first: Vector6 = _ZERO6
+    first_squares: Vector6 = _ZERO6
+    last: Vector6 = _ZERO6
+    last_squares: Vector6 = _ZERO6
 
 
 class FtReading(msgspec.Struct, frozen=True, gc=False):

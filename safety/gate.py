@@ -13,7 +13,7 @@ from enum import IntEnum
 
 import msgspec
 
-from robot_io.gate_frame import GateFrame
+from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
 from safety.settings import SafetySettings
 

@@ -17,20 +17,29 @@ import sys
 import msgspec
 from msgspec.structs import replace
 
-from robot_io.base_feed import BaseFeed, BaseOdometry, BasePose, BaseReport, CommandEcho, SliderPose
-from robot_io.base_record import BASE_RECORD_BYTES, BaseRecord, pack_base_record
 from robot_io.clock import NS_PER_MS, monotonic_ns
-from robot_io.config import BaseConfig, FramesConfig
 from robot_io.errors import PushError
-from robot_io.event_loop import EventLoop
-from robot_io.gate_frame import FRAME_BYTES, GateFrame, unpack_frame
-from robot_io.gate_log import GateLog
-from robot_io.messages import LinkState, Stamped
-from robot_io.process import lock_memory, set_timer_slack_1ns, try_realtime
-from robot_io.ridgeback import Ridgeback
-from robot_io.ring import Ring
-from robot_io.shared_record import SharedRecord
-from robot_io.status_pipe import StatusPipe
+from robot_io.ipc.base_record import BASE_RECORD_BYTES, pack_base_record
+from robot_io.ipc.event_loop import EventLoop
+from robot_io.ipc.gate_frame import FRAME_BYTES, GateFrame, unpack_frame
+from robot_io.ipc.process import lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.ring import Ring
+from robot_io.ipc.status import StatusPipe
+from robot_io.log.gate_log import GateLog
+from robot_io.messages import (
+    BaseFeed,
+    BaseOdometry,
+    BasePose,
+    BaseRecord,
+    BaseReport,
+    CommandEcho,
+    LinkState,
+    SliderPose,
+    Stamped,
+)
+from robot_io.ridgeback.driver import Ridgeback
+from robot_io.rig.config import BaseConfig, FramesConfig
 from safety import gate
 from safety.gate import GateLimits, GateState, Latch
 

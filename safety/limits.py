@@ -6,8 +6,8 @@ import math
 
 import msgspec
 
-from robot_io.config import RigConfig
 from robot_io.errors import ConfigError
+from robot_io.rig.config import RigConfig
 
 
 class Ceiling(msgspec.Struct, frozen=True):

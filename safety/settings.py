@@ -6,8 +6,8 @@ import math
 
 import msgspec
 
-from robot_io.config import RigConfig
 from robot_io.messages import Joints
+from robot_io.rig.config import RigConfig
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
 

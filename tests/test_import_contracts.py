@@ -9,19 +9,32 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+LAYERS = "tools on top, then laws, checks and simulation, which do not know each other, then robot_io"
 FOLDERS = ("robot_io", "control", "safety", "sim_backend", "tools")
 
 OFFENCES = {
-    "robot_io": ("tools.rig", {"robot_io stands alone"}),
-    "sim_backend": ("tools.rig", {"sim_backend builds on robot_io only"}),
-    "safety": ("control.path", {"safety does not know control"}),
-    "tools": ("threading", {"no asyncio, no threads, no multiprocessing of ours"}),
-    "control": (
-        "time, safety.limits, robot_io.event_loop, sim_backend.plant, control.loop",
+    "robot_io/ft300": (
+        "tools.rig, robot_io.ur10",
+        {LAYERS, "the rooms of robot_io, devices independent of each other"},
+    ),
+    "sim_backend/ridgeback": (
+        "sim_backend.ur10, robot_io.ridgeback",
         {
-            "only tools and tests know the simulation",
+            "the rooms of sim_backend: physics knows no wire, emulators do not know each other",
+            "no emulator knows the driver of its device",
+        },
+    ),
+    "sim_backend/physics": ("socket", {"physics knows no wire, file or process"}),
+    "safety": ("control.path", {LAYERS}),
+    "tools/places": (
+        "threading, tools.run",
+        {"no asyncio, no threads, no multiprocessing of ours", "the rooms of tools"},
+    ),
+    "control": (
+        "time, safety.limits, robot_io.ipc.event_loop, sim_backend.world.plant, control.loop",
+        {
+            LAYERS,
             "laws and checks know messages and settings, no device, clock or log",
-            "control laws and safety checks do not know each other",
             "laws and checks are pure: no clock, random, environment, socket or process, and math instead of numpy",
             "the impure rooms are entered from tools only",
         },
@@ -32,7 +45,8 @@ OFFENCES = {
 def test_each_contract_is_broken_by_its_offence(tmp_path):
     for folder in FOLDERS:
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
-        (tmp_path / folder / "offence.py").write_text(f"import {OFFENCES[folder][0]}\n", encoding="utf-8")
+    for room, (imports, _) in OFFENCES.items():
+        (tmp_path / room / "offence.py").write_text(f"import {imports}\n", encoding="utf-8")
     for impure in ("control/loop.py", "safety/gate_process.py"):
         (tmp_path / impure).touch()
     shutil.copy(ROOT / "pyproject.toml", tmp_path)

@@ -1,1 +1,1 @@
-"""The `push` program: composes drivers, loop, gate, recorder and emulators; start at `tools.launcher`."""
+"""The `push` program: composes drivers, loop, gate, recorder and emulators; start at `tools.run.launcher`."""

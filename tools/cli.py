@@ -33,48 +33,48 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "run": Command(
-        "tools.run_command",
+        "tools.commands.run",
         "one push, on hardware, emulated or simulated",
         ("push run emulated --distance-m 2", "push run sim --fast --seed 3 --json"),
     ),
     "replay": Command(
-        "tools.replay_command",
+        "tools.commands.replay",
         "fold a log again and compare every bit",
         ("push replay runs/demo/run.mcap", "push replay runs/demo/run.mcap --json"),
     ),
     "report": Command(
-        "tools.report_command",
+        "tools.commands.report",
         "figures and one self-contained page of a log",
         ("push report runs/demo/run.mcap", "push report runs/demo/run.mcap --json"),
     ),
     "log": Command(
-        "tools.log_command",
+        "tools.commands.log",
         "look into, export or recover a log",
         ("push log info runs/demo/run.mcap", "push log recover runs/demo/run.mcap"),
     ),
     "sweep": Command(
-        "tools.sweep",
+        "tools.commands.sweep",
         "many simulated pushes, and the paper's figures",
         ("push sweep --out sweeps/paper", "push sweep my-grid.toml --out sweeps/mine --resume"),
     ),
-    "tune": Command("tools.tune", "map of the gains over simulated pushes", ("push tune", "push tune --json")),
+    "tune": Command("tools.commands.tune", "map of the gains over simulated pushes", ("push tune", "push tune --json")),
     "emulate": Command(
-        "tools.emulate_command",
+        "tools.commands.emulate",
         "the wire emulators alone, until stopped",
         ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate all --json"),
     ),
     "config": Command(
-        "tools.config_command",
+        "tools.commands.config",
         "show or check a rig with all its values",
         ("push config show emulated --set control.k_f=0.1", "push config check my-rig.toml"),
     ),
     "bench sim": Command(
-        "tools.bench_sim",
+        "tools.commands.bench_sim",
         "measure how much faster than real time level sim is",
         ("push bench sim", "push bench sim --distance-m 2 --json"),
     ),
     "bench physics": Command(
-        "tools.bench_physics",
+        "tools.commands.bench_physics",
         "measure the slider's solvers",
         ("push bench physics", "push bench physics --json"),
     ),

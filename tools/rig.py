@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from robot_io.config import RigConfig, load_rig
-from robot_io.config_types import Matrix3
 from robot_io.errors import ConfigError
+from robot_io.rig.config import RigConfig, load_rig
+from robot_io.rig.types import Matrix3
 
 ROTATION_TOLERANCE = 1e-6
 

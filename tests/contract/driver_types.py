@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from robot_io.base_feed import BaseFeed
 from robot_io.driver import CommandedDriver, Driver
-from robot_io.ft300 import Ft300
-from robot_io.messages import BodyTwist, JointState, SensorWrench
-from robot_io.ridgeback import Ridgeback
-from robot_io.ur10 import Ur10
-from sim_backend.sim_ft300 import SimFt300
-from sim_backend.sim_ridgeback import SimRidgeback
-from sim_backend.sim_ur10 import SimUr10
+from robot_io.ft300.driver import Ft300
+from robot_io.messages import BaseFeed, BodyTwist, JointState, SensorWrench
+from robot_io.ridgeback.driver import Ridgeback
+from robot_io.ur10.driver import Ur10
+from sim_backend.sim.ft300 import SimFt300
+from sim_backend.sim.ridgeback import SimRidgeback
+from sim_backend.sim.ur10 import SimUr10
 
 
 def sensors(real: Ft300, simulated: SimFt300) -> tuple[Driver[SensorWrench], ...]:

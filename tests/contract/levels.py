@@ -15,18 +15,19 @@ from typing import Any, Protocol
 import pytest
 
 from robot_io.clock import VirtualClock
-from robot_io.config import TopicsConfig, load_rig
-from robot_io.ft300 import Ft300
-from robot_io.ridgeback import Ridgeback
-from robot_io.ur10 import Ur10
-from sim_backend.rig_settings import ridgeback_settings
-from sim_backend.sim_ft300 import SimFt300
-from sim_backend.sim_ridgeback import SimRidgeback
-from sim_backend.sim_ur10 import SimUr10
-from sim_backend.world import World
-from tests.ur_emulator_process import EmulatorProcess
+from robot_io.ft300.driver import Ft300
+from robot_io.ridgeback.driver import Ridgeback
+from robot_io.rig.config import load_rig
+from robot_io.rig.topics import TopicsConfig
+from robot_io.ur10.driver import Ur10
+from sim_backend.ridgeback.settings import ridgeback_settings
+from sim_backend.sim.ft300 import SimFt300
+from sim_backend.sim.ridgeback import SimRidgeback
+from sim_backend.sim.ur10 import SimUr10
+from sim_backend.world.world import World
 from tests.wire.bridge_process import running_bridge
 from tests.wire.ft300_process import ft300_process
+from tests.wire.ur_process import EmulatorProcess
 
 DEVICES = ("ft300", "ur10", "ridgeback")
 ADDRESSES = {"ft300": "PUSH_TEST_FT300_PORT", "ur10": "PUSH_TEST_UR10_HOST", "ridgeback": "PUSH_TEST_RIDGEBACK_URL"}

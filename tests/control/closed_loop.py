@@ -8,14 +8,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from robot_io.arm_record import ArmRecord
-from robot_io.base_record import BaseRecord
-from robot_io.gate_frame import GateFrame
-from robot_io.messages import BaseStatus, BodyTwist, JointState
+from robot_io.ipc.gate_frame import GateFrame
+from robot_io.messages import ArmRecord, BaseRecord, BaseStatus, BodyTwist, JointState
 from robot_io.tick import FtInput, FtReading, HostInput, Operator, TickInput, TickOutput, TickState
 from safety import gate
 from safety.gate import GateLimits, GateState
-from sim_backend.world import World
+from sim_backend.world.world import World
 from tools.rig import resolve_rig
 from tools.run.tick_core import TickCore
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from control.base_velocity import body_from_world, contact_point_world, heading_rate
 from control.path import StraightPath, wrap
 from control.push_law import force_angle, push_angle, return_angle
-from robot_io.config import PathConfig
 from robot_io.messages import BodyTwist, WorldTwist
+from robot_io.rig.config import PathConfig
 
 QUARTER = math.pi / 2
 angles = st.floats(-math.pi, math.pi)

@@ -5,7 +5,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from robot_io.ft300_tare import Refusal
+from control.tare import Refusal
 from robot_io.messages import BodyTwist
 from robot_io.tick import Phase
 from tests.safety.fold_bench import BIAS, FoldBench

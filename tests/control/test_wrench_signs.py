@@ -20,17 +20,17 @@ import pytest
 from msgspec.structs import replace
 
 import control.wrench
-import sim_backend.sensor_model
+import sim_backend.world.sensor_model
 from control.loop import ft_input
 from control.settings import Settings
 from control.step import step
-from robot_io.config import RigConfig
-from robot_io.ft300 import Ft300
-from robot_io.ft300_codec import StreamParser, wrench_from_counts
+from robot_io.ft300.codec import StreamParser, wrench_from_counts
+from robot_io.ft300.driver import Ft300
 from robot_io.messages import Pose2D, Stamped
+from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlState, FtReading, TickInput
-from sim_backend.contact_outcome import ContactMode, ContactOutcome
-from sim_backend.world import World
+from sim_backend.physics.contact_outcome import ContactMode, ContactOutcome
+from sim_backend.world.world import World
 from tests.mutants import sign_mutants
 from tools.rig import resolve_rig
 
@@ -114,7 +114,7 @@ def rig_with(sensor_origin, mounting=MOUNTING, *, tool_mass_kg=0.0, bias=(0.0,) 
     return replace(rig, frames=frames, world=replace(rig.world, sensor=sensor))
 
 
-def world_side_is_right(module=sim_backend.sensor_model, mounting=MOUNTING) -> bool:
+def world_side_is_right(module=sim_backend.world.sensor_model, mounting=MOUNTING) -> bool:
     for force, yaw, contact, origin, raw in CASES.values():
         model = module.SensorModel(rig_with(origin, mounting), 0)
         if model.true_reading(force, contact, yaw) != pytest.approx(raw, abs=2e-6):
@@ -166,7 +166,7 @@ def test_the_shipped_mounting_is_the_one_of_the_hand_calculation():
 @pytest.mark.parametrize("name", CASES)
 def test_the_simulated_sensor_reads_the_hand_numbers(name):
     force, yaw, contact, origin, raw = CASES[name]
-    model = sim_backend.sensor_model.SensorModel(rig_with(origin), 0)
+    model = sim_backend.world.sensor_model.SensorModel(rig_with(origin), 0)
     assert model.true_reading(force, contact, yaw) == pytest.approx(raw, abs=2e-6)
 
 
@@ -268,7 +268,9 @@ def test_a_reversed_or_swapped_axis_shows_on_either_side(name):
 
 
 DRIVER_SIGNS = sign_mutants("control.wrench", "force_on_slider_world")
-WORLD_SIGNS = sign_mutants("sim_backend.sensor_model", "__init__", "true_reading", "_in_sensor", "_cross", "_sum6")
+WORLD_SIGNS = sign_mutants(
+    "sim_backend.world.sensor_model", "__init__", "true_reading", "_in_sensor", "_cross", "_sum6"
+)
 
 
 @pytest.mark.parametrize("make", [m for _, m in DRIVER_SIGNS], ids=[name for name, _ in DRIVER_SIGNS])

@@ -19,9 +19,9 @@ import pytest
 from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import blame_the_host
 from tools.cli import COMMANDS
-from tools.fault_table import table
+from tools.dev.fault_table import table
+from tools.dev.rig_reference import reference
 from tools.rig import resolve_rig
-from tools.rig_reference import reference
 from tools.run.run_facts import PROGRAM_VERSION
 from tools.study.grid import load_grid
 
@@ -31,11 +31,13 @@ PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 
 
 def test_rig_reference_is_current():
-    assert (ROOT / "docs/rig-files.md").read_text() == reference(), "python -m tools.rig_reference > docs/rig-files.md"
+    assert (ROOT / "docs/rig-files.md").read_text() == reference(), (
+        "python -m tools.dev.rig_reference > docs/rig-files.md"
+    )
 
 
 def test_fault_table_is_current():
-    assert table() in (ROOT / "docs/safety.md").read_text(), "paste the output of python -m tools.fault_table"
+    assert table() in (ROOT / "docs/safety.md").read_text(), "paste the output of python -m tools.dev.fault_table"
 
 
 def test_the_version_is_the_same_everywhere():

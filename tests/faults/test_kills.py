@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_io.log_messages import SAFETY_EVENT
+from robot_io.log.messages import SAFETY_EVENT
 from robot_io.tick import TICK_CDR
 from safety.faults import FAULTS
 from tests.faults.kill_rounds import Round, pushing, strike, within
@@ -231,7 +231,7 @@ import sys
 if "tools.run.control_process" in sys.orig_argv:
     import os, signal
     from pathlib import Path
-    from robot_io.ft300 import Ft300
+    from robot_io.ft300.driver import Ft300
     start, close = Ft300.start, Ft300.close
     def close_and_say_so(self):
         close(self)

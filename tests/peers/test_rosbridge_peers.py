@@ -12,7 +12,7 @@ import time
 import pytest
 import websocket
 
-from robot_io.config import TopicsConfig
+from robot_io.rig.topics import TopicsConfig
 from tests.wire.bridge_process import Bridge, running_bridge, until
 
 POSE_TOPIC = "/vicon/ThingBase_4/ThingBase_4"

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.ur_emulator_process import EmulatorProcess, wait_until
+from tests.wire.ur_process import EmulatorProcess, wait_until
 
 HELD = [1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31]
 PRELUDE = """

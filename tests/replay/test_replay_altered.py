@@ -11,11 +11,11 @@ import pytest
 from msgspec.structs import replace
 
 from robot_io.errors import LogDamaged
-from robot_io.log_seal import LogSeal
-from robot_io.mcap_read import LogSummary, read_summary
+from robot_io.log.mcap_read import LogSummary, read_summary
+from robot_io.log.seal import LogSeal
+from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.messages import BodyTwist, LinkState, Pose2D, WorldTwist
 from robot_io.tick import ControlTick, Operator
-from robot_io.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from tests.replay.runs import Messages, changed, places, replayed, rewritten, with_data, with_input
 from tools.cli import main
 from tools.replay import verified_log

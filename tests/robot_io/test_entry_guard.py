@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -65,11 +66,25 @@ def test_foreign_module_already_loaded_is_one_sentence_and_exit_3(preload, forei
 def test_ctrl_c_while_it_is_still_loading_is_one_sentence(tmp_path):
     """The first tenths of a second go into imports; a stop that comes then must not end in a traceback."""
     code = (
-        "import importlib, os, signal\nimport robot_io._entry as entry\nreal = importlib.import_module\n"
-        "def interrupted(name):\n    os.kill(os.getpid(), signal.SIGINT)\n    return real(name)\n"
-        "importlib.import_module = interrupted\nraise SystemExit(entry.main())"
+        "import os, signal, sys\nimport robot_io._entry as entry\n"
+        "class Interrupted:\n    def find_spec(self, name, path, target=None):\n"
+        "        if name == 'tools.cli':\n            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupted())\nraise SystemExit(entry.main())"
     )
     done = run(code, ROOT, tmp_path, "config", "check", "sim", "--json")
     assert done.returncode == 130
     assert done.stderr == "push: stopped by the operator\n"
     assert json.loads(done.stdout)["error"]["code"] == 130
+
+
+def test_the_library_alone_says_that_the_application_runs_from_a_checkout(tmp_path):
+    shutil.copytree(ROOT / "robot_io", tmp_path / "robot_io", ignore=shutil.ignore_patterns("__pycache__"))
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", ENTRY, "run", "--json"],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, timeout=60,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 3
+    assert "runs from a checkout" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert json.loads(done.stdout)["error"]["code"] == 3

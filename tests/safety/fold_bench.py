@@ -12,9 +12,7 @@ from functools import cache
 
 from msgspec.structs import replace
 
-from robot_io.arm_record import ArmRecord
-from robot_io.base_record import BaseRecord
-from robot_io.messages import BaseStatus, BodyTwist, JointState, Pose2D
+from robot_io.messages import ArmRecord, BaseRecord, BaseStatus, BodyTwist, JointState, Pose2D
 from robot_io.tick import FtInput, FtReading, HostInput, Phase, TickInput, TickOutput, TickState
 from tools.rig import resolve_rig
 from tools.run.tick_core import TickCore

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from robot_io.gate_frame import GateFrame
+from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
 from safety import gate
 from safety.faults import FAULTS

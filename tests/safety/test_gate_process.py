@@ -7,15 +7,14 @@ from collections.abc import Iterator
 
 import pytest
 
-from robot_io.base_feed import BaseFeed, BaseOdometry
-from robot_io.base_record import BASE_RECORD_BYTES, BaseRecord, unpack_base_record
-from robot_io.config import BaseConfig, FramesConfig
-from robot_io.gate_frame import GateFrame, pack_frame
-from robot_io.log_channels import Kind
-from robot_io.messages import BodyTwist, DeviceHealth, LinkState, Stamped
-from robot_io.ring import Ring
-from robot_io.shared_record import SharedRecord
-from robot_io.status_pipe import StatusPipe
+from robot_io.ipc.base_record import BASE_RECORD_BYTES, unpack_base_record
+from robot_io.ipc.gate_frame import GateFrame, pack_frame
+from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.ring import Ring
+from robot_io.ipc.status import StatusPipe
+from robot_io.log.channels import Kind
+from robot_io.messages import BaseFeed, BaseOdometry, BaseRecord, BodyTwist, DeviceHealth, LinkState, Stamped
+from robot_io.rig.config import BaseConfig, FramesConfig
 from safety.gate import OWN_PAUSE_NS, GateLimits, Latch
 from safety.gate_process import LAST_ZEROS_NS, GateJob, GateProcess
 

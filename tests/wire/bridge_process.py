@@ -17,12 +17,12 @@ from typing import Any
 
 import msgspec
 
-from robot_io.config import TopicsConfig
-from robot_io.event_loop import EventLoop
+from robot_io.ipc.event_loop import EventLoop
 from robot_io.messages import BodyTwist, Pose2D
-from sim_backend.ridgeback_settings import BridgeSettings, RidgebackSettings
-from sim_backend.rosbridge_faults import BridgeFaults
-from sim_backend.rosbridge_standalone import StandaloneBase, standalone_emulator
+from robot_io.rig.topics import TopicsConfig
+from sim_backend.ridgeback.faults import BridgeFaults
+from sim_backend.ridgeback.settings import BridgeSettings, RidgebackSettings
+from sim_backend.ridgeback.standalone import StandaloneBase, standalone_emulator
 
 ROOT = Path(__file__).parents[2]
 

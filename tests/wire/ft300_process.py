@@ -20,10 +20,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from robot_io.event_loop import EventLoop
-from sim_backend.ft300_emulator import Ft300Emulator
-from sim_backend.ft300_knobs import Ft300Knobs
-from sim_backend.ft300_standalone import ConstantWrench
+from robot_io.ipc.event_loop import EventLoop
+from sim_backend.ft300.emulator import Ft300Emulator
+from sim_backend.ft300.knobs import Ft300Knobs
+from sim_backend.ft300.standalone import ConstantWrench
 
 ROOT = Path(__file__).parents[2]
 START_LIMIT_S = 20.0

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from robot_io.errors import EnvironmentFault
-from robot_io.event_loop import EventLoop
-from sim_backend.ft300_emulator import Ft300Emulator
-from sim_backend.ft300_pty import PtyPort
-from sim_backend.ft300_standalone import ConstantWrench
+from robot_io.ipc.event_loop import EventLoop
+from sim_backend.ft300.emulator import Ft300Emulator
+from sim_backend.ft300.pty import PtyPort
+from sim_backend.ft300.standalone import ConstantWrench
 from tests.wire.ft300_process import ft300_process, until
 
 PACKET = bytes.fromhex("20 4E D2 04 D2 E9 10 27 64 00 32 FB 8A 0C 0C 17")

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_io.clock import NS_PER_MS
-from sim_backend import ft300_wire as wire
-from sim_backend.ft300_line import WireDirection, next_delivery_ns
-from sim_backend.ft300_registers import SensorRegisters
+from sim_backend.ft300 import wire
+from sim_backend.ft300.line import WireDirection, next_delivery_ns
+from sim_backend.ft300.registers import SensorRegisters
 
 WRENCH = (12.34, -56.78, 100.00, 0.100, -1.230, 3.210)
 

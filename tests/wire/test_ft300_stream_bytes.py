@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_io.ft300_codec import (
+from robot_io.ft300.codec import (
     StreamParser,
     beyond_range,
     counts_from_registers,

@@ -8,12 +8,21 @@ import time
 import msgspec
 import pytest
 
-from robot_io.base_feed import BaseFeed, BaseOdometry, BasePose, BaseReport, CommandEcho, SliderPose
-from robot_io.config import TopicsConfig
 from robot_io.errors import ConfigError, DeviceNotReady, DeviceProtocolError, DeviceUnreachable
-from robot_io.event_loop import EventLoop
-from robot_io.messages import BodyTwist, LinkState, Stamped
-from robot_io.ridgeback import Ridgeback
+from robot_io.ipc.event_loop import EventLoop
+from robot_io.messages import (
+    BaseFeed,
+    BaseOdometry,
+    BasePose,
+    BaseReport,
+    BodyTwist,
+    CommandEcho,
+    LinkState,
+    SliderPose,
+    Stamped,
+)
+from robot_io.ridgeback.driver import Ridgeback
+from robot_io.rig.topics import TopicsConfig
 from tests.wire.bridge_process import Bridge, running_bridge, until
 
 FORWARD = BodyTwist(0.1, 0.0, 0.0)

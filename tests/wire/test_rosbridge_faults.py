@@ -9,12 +9,11 @@ import time
 import pytest
 import websocket
 
-from robot_io.base_feed import BaseFeed, BasePose, CommandEcho, SliderPose
-from robot_io.config import TopicsConfig
-from robot_io.messages import BodyTwist, LinkState, Pose2D, Stamped
-from robot_io.ridgeback import FRESH_NS, LINK_STALE_NS, Ridgeback
-from robot_io.websocket_link import LinkLost, WebSocketLink
-from sim_backend.ridgeback_settings import DEFAULT_SLIDER_TOPIC
+from robot_io.messages import BaseFeed, BasePose, BodyTwist, CommandEcho, LinkState, Pose2D, SliderPose, Stamped
+from robot_io.ridgeback.driver import FRESH_NS, LINK_STALE_NS, Ridgeback
+from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink
+from robot_io.rig.topics import TopicsConfig
+from sim_backend.ridgeback.settings import DEFAULT_SLIDER_TOPIC
 from tests.wire.bridge_process import Bridge, running_bridge, until
 
 FORWARD = BodyTwist(0.1, 0.0, 0.0)

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from tests.ur_emulator_process import EmulatorProcess, wait_until
+from tests.wire.ur_process import EmulatorProcess, wait_until
 
 
 class Lines:

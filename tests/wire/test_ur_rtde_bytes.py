@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from tests.ur_emulator_process import EmulatorProcess, wait_until
+from tests.wire.ur_process import EmulatorProcess, wait_until
 
 HELD_POSE = bytes.fromhex(
     "3ff921ff2e48e8a7bfc65604189374bc3ff921ff2e48e8a7bff6573eab367a103ff921ff2e48e8a73ff4f5c28f5c28f6"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ur_emulator_process import EmulatorProcess, wait_until
+from tests.wire.ur_process import EmulatorProcess, wait_until
 
 PLAYING, STOPPED, PAUSED = 2, 1, 4
 MOVE_J, SPEED_J, SERVO_J, SERVO_STOP, IS_STEADY, SET_WATCHDOG, STOP_SCRIPT = 1, 9, 11, 16, 47, 35, 255

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from robot_io.cdr import CdrType
-from robot_io.cdr_schema import type_from_schema
-from robot_io.cdr_shape import Blob, Many, Nested, Shape
+from robot_io.cdr.cdr_type import CdrType
+from robot_io.cdr.schema import type_from_schema
+from robot_io.cdr.shape import Blob, Many, Nested, Shape
 from robot_io.errors import LogDamaged, UsageError
-from robot_io.mcap_read import ChannelInfo, LogSummary, read_log
+from robot_io.log.mcap_read import ChannelInfo, LogSummary, read_log
 
 # Unit of a field by the type that holds it; an empty field name stands for every field of the type.
 _UNITS: dict[str, dict[str, str]] = {

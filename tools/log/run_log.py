@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from robot_io.config import rig_from_toml
 from robot_io.errors import LogDamaged
-from robot_io.log_channels import BY_TOPIC, CHANNELS, Kind
-from robot_io.log_seal import LogSeal, config_seal
-from robot_io.mcap_log import McapLog
-from robot_io.ros_messages import POSE_STAMPED, planar_pose
+from robot_io.log.chain import TickChain
+from robot_io.log.channels import BY_TOPIC, CHANNELS, Kind
+from robot_io.log.mcap_log import McapLog
+from robot_io.log.ros_messages import POSE_STAMPED, planar_pose
+from robot_io.log.seal import LogSeal, config_seal
+from robot_io.log.world_messages import STATE_CDR
+from robot_io.rig.config import rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
-from robot_io.tick_chain import TickChain
-from robot_io.world_messages import STATE_CDR
 from tools.log.scene_topics import scene_messages, slider_frame, slider_pose
 from tools.log.tick_topics import Message, TickTopics
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import math
 
-from robot_io.config import RigConfig
-from robot_io.config_types import Matrix3
-from robot_io.ros_messages import (
+from robot_io.log.ros_messages import (
     Header,
     Path,
     Pose,
@@ -25,6 +23,8 @@ from robot_io.ros_messages import (
     ros_time,
     yaw_quaternion,
 )
+from robot_io.rig.config import RigConfig
+from robot_io.rig.types import Matrix3
 from tools.log.tick_topics import BASE_FRAME, SENSOR_FRAME, WORLD_FRAME, Message, message
 
 BALL_FRAME, SLIDER_FRAME = "contact_ball", "slider"

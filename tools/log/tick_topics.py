@@ -9,10 +9,9 @@ import math
 from typing import Any, NamedTuple
 
 from robot_io.clock import NS_PER_S
-from robot_io.log_channels import BY_TOPIC
-from robot_io.log_messages import LoopTiming, SafetyEvent
-from robot_io.messages import BodyTwist, LinkState
-from robot_io.ros_messages import (
+from robot_io.log.channels import BY_TOPIC
+from robot_io.log.messages import LoopTiming, SafetyEvent
+from robot_io.log.ros_messages import (
     DiagnosticArray,
     DiagnosticStatus,
     Header,
@@ -30,6 +29,7 @@ from robot_io.ros_messages import (
     ros_time,
     yaw_quaternion,
 )
+from robot_io.messages import BodyTwist, LinkState
 from robot_io.tick import ControlTick, FtReading, Mode
 from safety.faults import FAULTS
 

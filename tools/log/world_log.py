@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from robot_io.log_channels import Kind
-from robot_io.world_messages import (
+from robot_io.log.channels import Kind
+from robot_io.log.world_messages import (
     COMMAND_CDR,
     STALL_CDR,
     START_CDR,

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from robot_io.config import RigConfig, rig_from_toml
 from robot_io.errors import LogDamaged, PushError
-from robot_io.log_seal import CONFIG_FACT, LogSeal, config_seal
-from robot_io.mcap_log import CONFIG_ATTACHMENT, END_METADATA, RUN_METADATA
-from robot_io.mcap_read import LogMessage, read_log, read_summary
-from robot_io.mcap_recover import RECOVERED_METADATA
+from robot_io.log.chain import TickChain
+from robot_io.log.mcap_log import CONFIG_ATTACHMENT, END_METADATA, RUN_METADATA
+from robot_io.log.mcap_read import LogMessage, read_log, read_summary
+from robot_io.log.mcap_recover import RECOVERED_METADATA
+from robot_io.log.seal import CONFIG_FACT, LogSeal, config_seal
+from robot_io.rig.config import RigConfig, rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
-from robot_io.tick_chain import TickChain
 from tools.log.run_log import OFFSET_FACT
 
 TICK_TOPIC = "/control/tick"

@@ -6,10 +6,10 @@ from collections import deque
 
 import msgspec
 
-from robot_io.config import RigConfig
-from robot_io.world_messages import COMMAND_CDR, START_CDR, STATE_CDR, WorldState
-from sim_backend.base_plant import GRID_NS
-from sim_backend.world import STATE_EVERY_STEPS, World, WorldRecord
+from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR, WorldState
+from robot_io.rig.config import RigConfig
+from sim_backend.world.base_plant import GRID_NS
+from sim_backend.world.world import STATE_EVERY_STEPS, World, WorldRecord
 from tools.replay.difference import Difference, difference
 
 PREFIX = "/world/"

@@ -20,7 +20,7 @@ from string import Template
 from typing import Any
 
 from robot_io.errors import EnvironmentFault, PushError, UsageError
-from robot_io.mcap_walk import Grown
+from robot_io.log.mcap_walk import Grown
 from safety.faults import FAULTS
 from tools.report import words
 from tools.report.run_data import RunData, read_run
@@ -200,7 +200,7 @@ def main(argv: Sequence[str]) -> int:
 
     One line on stderr says what went wrong.
     """
-    from robot_io.process import die_with_parent
+    from robot_io.ipc.process import die_with_parent
     from tools.report.style import warm_up
 
     die_with_parent(int(argv[2]))

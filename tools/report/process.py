@@ -11,7 +11,7 @@ import subprocess
 from pathlib import Path
 
 from robot_io.errors import EnvironmentFault
-from robot_io.process import fresh_interpreter
+from robot_io.ipc.process import fresh_interpreter
 
 TIMEOUT_S = 60.0
 

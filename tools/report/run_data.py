@@ -9,16 +9,16 @@ from typing import Any
 
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
-from robot_io.cdr import CdrType
+from robot_io.cdr.cdr_type import CdrType
 from robot_io.clock import NS_PER_S
-from robot_io.config import RigConfig, rig_from_toml
 from robot_io.errors import LogDamaged, PushError
-from robot_io.log_messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
-from robot_io.mcap_walk import Grown, walk
-from robot_io.planar_pose import wrap_angle, yaw_from_quaternion
-from robot_io.ros_messages import POSE_STAMPED
+from robot_io.geometry import wrap_angle, yaw_from_quaternion
+from robot_io.log.mcap_walk import Grown, walk
+from robot_io.log.messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
+from robot_io.log.ros_messages import POSE_STAMPED
+from robot_io.log.world_messages import STATE_CDR
+from robot_io.rig.config import RigConfig, rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick, Phase
-from robot_io.world_messages import STATE_CDR
 from tools.report.bounded_series import Floats, Series, Span, Spans, Tally
 
 MOST_SKIPS = 5000

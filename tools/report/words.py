@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 
 from control.run_notes import outcome
-from robot_io.config import RigConfig, load_rig, shipped_rigs
+from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
 from robot_io.tick import Phase
 from safety.faults import FAULTS
 from tools.report.bounded_series import Floats
 from tools.report.run_data import RunData
 from tools.report.style import phase_spans
-from tools.run.verdict import VERDICTS, lost
+from tools.terminal.verdict import VERDICTS, lost
 
 
 class Verdict(NamedTuple):

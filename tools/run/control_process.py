@@ -14,14 +14,14 @@ import msgspec
 
 from control.loop import ControlLoop, Watch
 from control.run_notes import outcome
-from robot_io.base_link import BaseLink
-from robot_io.config import rig_from_toml
 from robot_io.errors import PushError
-from robot_io.ft300 import Ft300
-from robot_io.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
-from robot_io.ring import Ring
-from robot_io.status_pipe import StatusPipe
-from robot_io.ur10 import ArmLink
+from robot_io.ft300.driver import Ft300
+from robot_io.ipc.gate_link import GateLink
+from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.ring import Ring
+from robot_io.ipc.status import StatusPipe
+from robot_io.rig.config import rig_from_toml
+from robot_io.ur10.driver import ArmLink
 from tools.run.jobs import ControlJob
 from tools.run.run_state import first_state, status_line
 from tools.run.tick_core import TickCore
@@ -54,7 +54,7 @@ def main() -> int:
     rig = rig_from_toml(job.rig_toml)
     sensor = Ft300(job.ft_port)
     core = TickCore.of(rig, in_contact=job.saved_tare is not None)
-    base = BaseLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
+    base = GateLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
     watch = Watch(gate=job.gate_pidfd, arm=job.arm_pidfd, recorder=job.recorder_pidfd)
     loop = ControlLoop(

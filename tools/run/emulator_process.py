@@ -16,13 +16,13 @@ import sys
 import msgspec
 
 from robot_io.clock import NS_PER_MS, monotonic_ns
-from robot_io.config import rig_from_toml
 from robot_io.errors import PushError
-from robot_io.event_loop import EventLoop
-from robot_io.process import lock_memory, set_timer_slack_1ns, try_realtime
-from robot_io.ring import Ring
-from robot_io.status_pipe import StatusPipe
-from sim_backend.world import World
+from robot_io.ipc.event_loop import EventLoop
+from robot_io.ipc.process import lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.ring import Ring
+from robot_io.ipc.status import StatusPipe
+from robot_io.rig.config import rig_from_toml
+from sim_backend.world.world import World
 from tools.log.world_log import into
 from tools.run.emulators import OPENERS, endpoint
 from tools.run.jobs import EmulatorJob

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from robot_io.config import RigConfig
 from robot_io.errors import EnvironmentFault
-from robot_io.event_loop import EventLoop
-from sim_backend.ft300_emulator import Ft300Emulator
-from sim_backend.rig_settings import ridgeback_settings
-from sim_backend.rosbridge_emulator import RosbridgeEmulator
-from sim_backend.ur_emulator import UrEmulator
-from sim_backend.world import World
+from robot_io.ipc.event_loop import EventLoop
+from robot_io.rig.config import RigConfig
+from sim_backend.ft300.emulator import Ft300Emulator
+from sim_backend.ridgeback.emulator import RosbridgeEmulator
+from sim_backend.ridgeback.settings import ridgeback_settings
+from sim_backend.ur10.emulator import UrEmulator
+from sim_backend.world.world import World
 
 ARM_HOSTS = tuple(f"127.0.0.{last}" for last in range(10, 250))
 """A UR10's ports are fixed, so each emulated arm needs a loopback address of its own."""

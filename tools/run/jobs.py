@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from tools.run.saved_tare import SavedTare
+from tools.places.saved_tare import SavedTare
 
 
 class ControlJob(msgspec.Struct, frozen=True):

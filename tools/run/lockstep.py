@@ -15,26 +15,24 @@ from msgspec.structs import replace
 
 from control.loop import ft_input
 from control.run_notes import RunNotes, outcome
-from robot_io.arm_record import ArmRecord
-from robot_io.base_feed import BaseOdometry, BasePose, BaseReport
-from robot_io.base_record import BaseRecord
 from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, VirtualClock
-from robot_io.config import RigConfig
-from robot_io.gate_frame import GateFrame
-from robot_io.gate_log import GateLog
+from robot_io.ipc.gate_frame import GateFrame
+from robot_io.log.gate_log import GateLog
+from robot_io.messages import ArmRecord, BaseOdometry, BasePose, BaseRecord, BaseReport
+from robot_io.rig.config import RigConfig
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety import gate
 from safety.gate import GateLimits, GateState
-from sim_backend.rig_settings import ridgeback_settings
-from sim_backend.sim_ft300 import SimFt300
-from sim_backend.sim_ridgeback import SimRidgeback
-from sim_backend.sim_ur10 import SimUr10
-from sim_backend.world import World
+from sim_backend.ridgeback.settings import ridgeback_settings
+from sim_backend.sim.ft300 import SimFt300
+from sim_backend.sim.ridgeback import SimRidgeback
+from sim_backend.sim.ur10 import SimUr10
+from sim_backend.world.world import World
 from tools.log.run_log import RunLog
 from tools.log.world_log import into
+from tools.places.saved_tare import SavedTare
 from tools.run.run_facts import run_facts
 from tools.run.run_state import first_state
-from tools.run.saved_tare import SavedTare
 from tools.run.tick_core import TickCore, tick_message
 
 START_NS = NS_PER_S

@@ -26,23 +26,23 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from robot_io.arm_record import ARM_RECORD_BYTES
-from robot_io.base_record import BASE_RECORD_BYTES
 from robot_io.clock import wall_offset_ns
-from robot_io.config import RigConfig, rig_to_toml
-from robot_io.ring import Ring
-from robot_io.shared_record import SharedRecord
-from robot_io.ur10 import spawn_child
+from robot_io.ipc.arm_record import ARM_RECORD_BYTES
+from robot_io.ipc.base_record import BASE_RECORD_BYTES
+from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.ring import Ring
+from robot_io.ipc.spawn import Child, spawn
+from robot_io.rig.config import RigConfig, rig_to_toml
+from robot_io.ur10.driver import spawn_child
 from safety.gate import GateLimits
 from safety.gate_process import GateJob
 from safety.settings import SafetySettings
-from tools.recorder import Job as RecorderJob
-from tools.recorder import RingSource
+from tools.places.saved_tare import SavedTare
 from tools.rig import devices_at
-from tools.run.children import Child, spawn
 from tools.run.jobs import ControlJob, EmulatorJob
+from tools.run.recorder import Job as RecorderJob
+from tools.run.recorder import RingSource
 from tools.run.run_facts import level_of, run_facts
-from tools.run.saved_tare import SavedTare
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes of a recorder that does not drain."""
@@ -157,7 +157,7 @@ class Processes:
         rings = [RingSource(name, ring.fd) for name, ring in self._rings.items()]
         alive = [self._alive[name][0] for name in ("control", "gate", "world")]
         job = RecorderJob(str(self._log), config_text, facts, self._offset_ns, rings, alive, -1)
-        self._spawn("recorder", "tools.recorder", job, [*(ring.fd for ring in rings), *alive])
+        self._spawn("recorder", "tools.run.recorder", job, [*(ring.fd for ring in rings), *alive])
 
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
         limits = GateLimits.of(SafetySettings.of(rig))

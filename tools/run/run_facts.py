@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 
-from robot_io.config import RigConfig
+from robot_io.rig.config import RigConfig
 
 PROGRAM_VERSION = "0.1.0"
 

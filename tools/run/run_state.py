@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState
-from tools.run.saved_tare import SavedTare
+from tools.places.saved_tare import SavedTare
 
 
 def first_state(saved: SavedTare | None) -> TickState:

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 
 from control.settings import Settings
 from control.step import step
-from robot_io.config import RigConfig
 from robot_io.messages import BodyTwist, WorldTwist
+from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, EnvelopeState, Mode, TickInput, TickOutput, TickState
 from safety import envelope
 from safety.base_checks import trusted_pose

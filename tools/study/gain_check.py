@@ -1,4 +1,4 @@
-"""The limits of `sim_backend.gain_limits` found again by simulation: where a small weave begins to grow.
+"""The limits of `sim_backend.physics.gain_limits` found again by simulation: where a small weave begins to grow.
 
 The simulated push is the world's own (`contact.PushedSlider` with its floor), the law steps with the force of the step
 before, and the growth rate of a small weave is followed through zero.
@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from math import atan2, cos, log, sin
 
-from sim_backend.contact import PushedSlider
-from sim_backend.floor import Floor, FloorEffects
-from sim_backend.gain_limits import PushedBody
-from sim_backend.shapes import Circle, Rectangle
-from sim_backend.slider import SliderModel
+from sim_backend.physics.contact import PushedSlider
+from sim_backend.physics.floor import Floor, FloorEffects
+from sim_backend.physics.gain_limits import PushedBody
+from sim_backend.physics.shapes import Circle, Rectangle
+from sim_backend.physics.slider import SliderModel
 
 SPEED_M_PER_S = 0.1
 LONGEST_STEP_S = 0.004

@@ -16,13 +16,13 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from robot_io import toml_text
-from robot_io.config_types import Positive, Table
 from robot_io.errors import ConfigError
-from robot_io.table_check import build
-from robot_io.toml_text import Origins
-from sim_backend.lanes import Lane, Timing
-from sim_backend.slider import Circle, Rectangle, pressure_distance_m
+from robot_io.rig import toml as toml_text
+from robot_io.rig.checks import build
+from robot_io.rig.toml import Origins
+from robot_io.rig.types import Positive, Table
+from sim_backend.physics.lanes import Lane, Timing
+from sim_backend.physics.slider import Circle, Rectangle, pressure_distance_m
 
 MOST_CASES = 1_000_000
 MOST_STATES = 20_000_000

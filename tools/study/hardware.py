@@ -14,8 +14,8 @@ from typing import Any
 
 import msgspec
 
-from robot_io.config import RigConfig, load_rig
 from robot_io.errors import PushError, UsageError
+from robot_io.rig.config import RigConfig, load_rig
 from tools.study.items import Part, Row
 
 CLOSED_RUNS = 10
@@ -164,8 +164,8 @@ def run_hardware_item(item: HardwareItem) -> Part:
 def sources(root: Path) -> tuple[Path, ...]:
     """Return the program text a push depends on."""
     folders = ("control", "safety", "sim_backend", "robot_io")
-    found = [path for folder in folders for path in sorted((root / folder).glob("*.py"))]
-    found += sorted((root / "robot_io" / "rigs").glob("*.toml"))
+    found = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
+    found += sorted((root / "robot_io" / "rig").glob("*.toml"))
     found += [root / f"tools/run/{name}.py" for name in ("lockstep", "run_state", "tick_core")]
     return (*found, root / "tools/study/hardware.py")
 

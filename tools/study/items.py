@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from robot_io.errors import EnvironmentFault, PushError
-from sim_backend.lanes import LaneEnd, LaneResult, Timing
+from sim_backend.physics.lanes import LaneEnd, LaneResult, Timing
 from tools.study.grid import Case, Study, lane_of
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def run_lane_item(item: LaneItem) -> Part:
 def _run(item: LaneItem) -> Part:
     import numpy as np
 
-    from sim_backend.batch import run_batch
+    from sim_backend.physics.batch import run_batch
 
     results, states = run_batch([lane_of(case) for case in item.cases], item.timing)
     rows: list[Row] = []

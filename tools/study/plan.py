@@ -31,8 +31,8 @@ ROOT = Path(__file__).resolve().parents[2]
 LANE_SOURCES = tuple(
     ROOT / f"{name}.py"
     for name in (
-        "sim_backend/batch", "sim_backend/lanes", "sim_backend/shapes", "sim_backend/slider",
-        "sim_backend/slider_exact", "tools/study/grid", "tools/study/items",
+        "sim_backend/physics/batch", "sim_backend/physics/lanes", "sim_backend/physics/shapes",
+        "sim_backend/physics/slider", "sim_backend/physics/slider_exact", "tools/study/grid", "tools/study/items",
     )
 )  # fmt: skip
 
@@ -74,8 +74,8 @@ def hardware_plan(gains: tuple[float, float] | None, dt_s: float | None, open_lo
 
 def compile_kernel() -> None:
     """Compile the lanes' kernel once, here, so that the workers find it in numba's cache."""
-    from sim_backend.batch import run_batch
-    from sim_backend.lanes import Lane, Timing
+    from sim_backend.physics.batch import run_batch
+    from sim_backend.physics.lanes import Lane, Timing
 
     run_batch([Lane(True, 0.5, 0.5, 0.3, 0.5, 0.0, 0.0, 0.0)], Timing(steps=1, record_every=1))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from sim_backend.lanes import LaneEnd
+from sim_backend.physics.lanes import LaneEnd
 from tools.study.grid import Case, Study
 from tools.study.items import Row
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from sim_backend.gain_limits import WARN_SHARE
+from sim_backend.physics.gain_limits import WARN_SHARE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

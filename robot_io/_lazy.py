@@ -1,0 +1,18 @@
+"""Names of a package that are imported when they are first used, so that a package costs only what is used of it."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+
+def exports(package: str, modules: dict[str, str]) -> Callable[[str], Any]:
+    """Return the `__getattr__` (PEP 562) of `package`; `modules` says which of its modules defines each name."""
+
+    def find(name: str) -> Any:
+        if name not in modules:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(importlib.import_module(f"{package}.{modules[name]}"), name)
+
+    return find

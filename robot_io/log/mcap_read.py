@@ -1,0 +1,100 @@
+"""Reads a finished, verified log: its messages one by one, or a summary of what it holds.
+
+for topic, log_time_ns, payload, schema_name in read_log(Path("run.mcap")): ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+
+from robot_io.log.mcap_walk import walk
+
+
+class LogMessage(NamedTuple):
+    """One message of a log, in the order of the file."""
+
+    topic: str
+    log_time_ns: int
+    payload: bytes
+    schema_name: str
+
+
+class ChannelInfo(NamedTuple):
+    """One topic of a log."""
+
+    topic: str
+    schema_name: str
+    schema_text: str
+    latched: bool
+    messages: int
+
+
+class LogSummary(NamedTuple):
+    """What a whole, verified log holds."""
+
+    size_bytes: int
+    library: str
+    channels: tuple[ChannelInfo, ...]
+    attachments: dict[str, bytes]
+    metadata: dict[str, dict[str, str]]
+    messages: int
+    start_ns: int
+    end_ns: int
+
+
+def read_log(path: Path) -> Iterator[LogMessage]:
+    """Yield every message of a finished log, in the order of the file.
+
+    Raises UsageError when there is no such file, LogDamaged at the latest at the end: take all before trusting any.
+    """
+    channels: dict[int, tuple[str, str]] = {}
+    schemas: dict[int, str] = {}
+    for item in walk(path):
+        if isinstance(item, Message):
+            topic, schema_name = channels[item.channel_id]
+            yield LogMessage(topic, item.log_time, item.data, schema_name)
+        elif isinstance(item, Channel):
+            channels[item.id] = (item.topic, schemas[item.schema_id])
+        elif isinstance(item, Schema):
+            schemas[item.id] = item.name
+
+
+def read_summary(path: Path) -> LogSummary:
+    """Read a finished log to its end and return what it holds. Raises as `read_log`."""
+    library, attachments, metadata = "", {}, {}
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    counts: dict[int, int] = {}
+    start_ns, end_ns = 2**64, 0
+    for item in walk(path):
+        if isinstance(item, Message):
+            counts[item.channel_id] = counts.get(item.channel_id, 0) + 1
+            start_ns, end_ns = min(start_ns, item.log_time), max(end_ns, item.log_time)
+        elif isinstance(item, Channel):
+            channels[item.id] = item
+        elif isinstance(item, Schema):
+            schemas[item.id] = item
+        elif isinstance(item, Attachment):
+            attachments[item.name] = item.data
+        elif isinstance(item, Metadata):
+            metadata[item.name] = item.metadata
+        else:
+            library = item.library
+    table = tuple(
+        ChannelInfo(
+            channel.topic,
+            schemas[channel.schema_id].name,
+            schemas[channel.schema_id].data.decode(errors="replace"),
+            "offered_qos_profiles" in channel.metadata,
+            counts.get(channel_id, 0),
+        )
+        for channel_id, channel in channels.items()
+    )
+    messages = sum(counts.values())
+    return LogSummary(
+        path.stat().st_size, library, table, attachments, metadata, messages, start_ns if messages else 0, end_ns
+    )

@@ -1,0 +1,103 @@
+"""Makes a whole log of what is left of a truncated one, sealed as it is, so that a later change is seen."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+
+from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
+from robot_io.log.mcap_log import CONFIG_ATTACHMENT, LIBRARY, PROFILE, create_new, finish_writer
+from robot_io.log.mcap_walk import LogItem, walk
+from robot_io.log.mcap_write import McapWriter
+from robot_io.log.seal import LogSeal, config_seal
+
+RECOVERED_METADATA = "recovered"
+
+
+class Recovered(NamedTuple):
+    """What was saved, and what was wrong with the source."""
+
+    messages: int
+    cause: str
+
+
+def recover(path: Path, out_path: Path) -> Recovered:
+    """Copy everything before the first damage of `path` into a new, finished log.
+
+    Raises UsageError when `out_path` exists or `path` is whole, LogDamaged when nothing can be saved,
+    EnvironmentFault when the disk does not take it.
+    """
+    if out_path.exists():
+        raise UsageError("there is already a file of this name", where=str(out_path), do="Give another name with --out")
+    items = walk(path, finished=False)
+    first = next(items)  # nothing is created for a file that is no log
+    stream = create_new(out_path)
+    try:
+        copy = _Copy(McapWriter(stream, PROFILE, LIBRARY))
+        cause = ""
+        try:
+            copy.take(first)
+            for item in items:
+                copy.take(item)
+        except LogDamaged as damage:
+            cause = damage.what
+        if not cause:
+            raise UsageError("the log is whole, there is nothing to recover", where=str(path))
+        if copy.seal.messages == 0:
+            raise LogDamaged(f"no message can be saved: {cause}", where=str(path))
+        copy.writer.flush()
+        facts = {"source": path.name, "cause": cause, **copy.seal.facts(), **config_seal(copy.config)}
+        copy.writer.add_metadata(RECOVERED_METADATA, facts)
+        finish_writer(copy.writer, stream)
+    except BaseException as error:
+        with suppress(OSError):  # it flushes, onto a disk that may be full
+            stream.close()
+        out_path.unlink()
+        if isinstance(error, OSError):
+            raise EnvironmentFault(
+                f"the log cannot be written: {error.strerror}",
+                where=str(out_path),
+                do="Make room, or give another --out",
+            ) from None
+        raise
+    return Recovered(copy.seal.messages, cause)
+
+
+class _Copy:
+    """The records written so far, under their new numbers."""
+
+    def __init__(self, writer: McapWriter) -> None:
+        self.writer = writer
+        self.seal = LogSeal()
+        self.config = b""
+        self._topics: dict[int, str] = {}
+        self._types: dict[int, Schema] = {}
+        self._schemas: dict[int, int] = {}
+        self._channels: dict[int, int] = {}
+
+    def take(self, item: LogItem) -> None:
+        """Append one record."""
+        if isinstance(item, Message):
+            channel_id = self._channels[item.channel_id]
+            self.writer.add_message(channel_id, item.log_time, item.data, item.publish_time, item.sequence)
+            self.seal.note(self._topics[item.channel_id], item.log_time, item.data)
+        elif isinstance(item, Schema):
+            self._types[item.id] = item
+            self._schemas[item.id] = self.writer.register_schema(item.name, item.encoding, item.data)
+        elif isinstance(item, Channel):
+            self._topics[item.id] = item.topic
+            schema = self._types[item.schema_id]
+            self.seal.declare(item.topic, schema.name, schema.data)
+            schema_id = self._schemas[item.schema_id]
+            self._channels[item.id] = self.writer.register_channel(
+                item.topic, item.message_encoding, schema_id, item.metadata
+            )
+        elif isinstance(item, Attachment):
+            self.writer.add_attachment(item.create_time, item.log_time, item.name, item.media_type, item.data)
+            if item.name == CONFIG_ATTACHMENT:
+                self.config = item.data
+        elif isinstance(item, Metadata):
+            self.writer.add_metadata(item.name, item.metadata)

@@ -1,0 +1,292 @@
+"""Driver of the Clearpath Ridgeback over rosbridge (v2, websocket): velocity out; pose, odometry, status in.
+
+    with Ridgeback("ws://192.168.131.1:9090") as base:
+        base.command(BodyTwist(0.05, 0.0, 0.0))
+        for sample in base.drain():
+            print(sample)
+
+One thread, never blocking after `start`: call `drain` when `fileno()` is readable and at least every 20 ms.
+What the bridge gets wrong is handled here: it never reports an error (checked beforehand by
+`preflight`, and by hearing our own commands back), it delivers old commands after a hang (nothing
+that moves is sent on a quiet link; a link that is quiet, or gives back none of our commands, for 0.3 s is reset,
+never closed in peace, never reopened), and it forwards NaN, which the base takes for full speed backwards (refused).
+The base itself stops 0.25 s after the last command.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Literal
+
+from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
+from robot_io.driver import DriverBase
+from robot_io.errors import ConfigError, DeviceNotReady, DeviceUnreachable
+from robot_io.messages import (
+    BaseFeed,
+    BasePose,
+    BodyTwist,
+    CommandEcho,
+    DeviceHealth,
+    DeviceInfo,
+    LinkState,
+    Pose2D,
+    Stamped,
+)
+from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
+from robot_io.ridgeback.preflight import check_topics
+from robot_io.ridgeback.rosbridge_codec import (
+    Published,
+    decode_frame,
+    encode_advertise,
+    encode_subscribe,
+    encode_twist,
+    spell_type,
+)
+from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink, parse_url
+from robot_io.rig.topics import TopicsConfig
+
+PoseSource = Literal["mocap", "odometry", "joint_states"]
+
+FRESH_NS = 100 * NS_PER_MS
+"""Nothing that moves is sent when the newest message from the bridge is older than this."""
+LINK_STALE_NS = 300 * NS_PER_MS
+"""The link is reset when the newest message from the bridge is older than this, or a command not heard back since."""
+PING_PERIOD_NS = 100 * NS_PER_MS
+FIRST_MESSAGE_TIMEOUT_S = 2.0
+MAX_PENDING = 4096
+"""Samples kept for `drain`; older ones are dropped and counted."""
+
+ZERO = BodyTwist()
+
+
+class Ridgeback(DriverBase):
+    """The base: give it velocities in the BODY frame, drain `Stamped[BaseFeed]` samples from it.
+
+    `pose_source`: which topic says where the base is. `base_from_marker`: x (m), y (m), yaw (rad) of the motion
+    capture's marker frame in the BODY frame. `before_close` is called with the descriptor just before the socket
+    is closed, also when the link is given up: an event loop must forget it then.
+    Raises ConfigError when the topics cannot serve the pose source.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        topics: TopicsConfig = TopicsConfig(),  # noqa: B008 - frozen
+        pose_source: PoseSource = "mocap",
+        base_from_marker: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        clock: ClockNs = monotonic_ns,
+        before_close: Callable[[int], None] | None = None,
+    ) -> None:
+        parse_url(url)
+        self.url = url
+        self.before_close = before_close
+        self._clock = clock
+        topics = with_full_names(topics)
+        self._topic = topics.command
+        self._type = spell_type(topics.command_type, topics.ros_version)
+        if not self._topic:
+            raise ConfigError("the base needs a command topic", where="base.topics.command", do="Name it")
+        self._types = feed_types(topics, pose_source)
+        self._reader = FeedReader(topics, pose_source, Pose2D(*base_from_marker))
+        self._link: WebSocketLink | None = None
+        self._state = LinkState.CLOSED
+        self._cause = ""
+        self._samples: deque[Stamped[BaseFeed]] = deque()
+        self._pose_times: deque[int] = deque(maxlen=100)
+        self._last_ping_ns = 0
+        self._unheard_ns = 0  # when the oldest command left that may not have been heard back; 0 when there is none
+        self._started = False
+        self.newest_inbound_ns = 0
+        """When the newest message of any topic arrived; 0 before the first."""
+        self.newest_pong_ns = 0
+        """When the bridge last answered a ping (proves its I/O only); 0 before the first."""
+        self.sent_ns = 0
+        """When the last command left."""
+        self._counters = dict.fromkeys(
+            ("messages", "undecodable", "sent", "held_back", "dropped_samples", "unanswered_checks", "pings"), 0
+        )
+
+    def open(self) -> DeviceInfo:
+        """Connect, check topics, advertise, subscribe; at most 3.5 s.
+
+        Raises DeviceUnreachable, DeviceProtocolError (no bridge, wrong message type), DeviceNotReady.
+        """
+        self.close()
+        self._reset()
+        self._state = LinkState.OPENING
+        self._link = link = WebSocketLink.connect(self.url, self._clock)
+        try:
+            open_questions = check_topics(
+                link, self.url, self._topic, {self._topic: self._type, **self._types}, self._clock
+            )
+            link.send_text(encode_advertise(self._topic, self._type))
+            for topic, type_name in self._types.items():
+                link.send_text(encode_subscribe(topic, type_name))
+            link.send_text(encode_subscribe(self._topic, self._type))
+        except LinkLost as lost:
+            self._give_up(str(lost))
+            raise DeviceUnreachable(str(lost), where=self.url, do="Check the bridge's log on the robot") from lost
+        except BaseException:
+            self.close()
+            raise
+        self._counters["unanswered_checks"] = len(open_questions)
+        return DeviceInfo("ridgeback", self.url, "Ridgeback", link.server)
+
+    def start(self) -> None:
+        """Wait for the first message of pose, odometry and status; at most 2 s.
+
+        Raises DeviceNotReady naming the topics that stayed silent, DeviceUnreachable when the link breaks.
+        """
+        until_ns = self._clock() + int(FIRST_MESSAGE_TIMEOUT_S * NS_PER_S)
+        while silent := self._reader.silent_topics():
+            link = self._link
+            if link is None:
+                raise DeviceUnreachable(self._cause or "not open", where=self.url, do="Open the driver again")
+            if not link.wait_readable(until_ns):
+                raise DeviceNotReady(
+                    f"no message on {', '.join(silent)} within {FIRST_MESSAGE_TIMEOUT_S:g} s",
+                    where=self.url,
+                    do="Check that its publisher runs (motion capture: is the base seen?) and its name in the rig file",
+                )
+            self._receive()
+        self._started = True
+        if self._link is not None:
+            self._state = LinkState.UP
+
+    def fileno(self) -> int:
+        """Return the socket's descriptor, -1 when there is none."""
+        return -1 if self._link is None else self._link.fileno()
+
+    def drain(self) -> tuple[Stamped[BaseFeed], ...]:
+        """Return every new sample, oldest first (`seq` counts per kind); also keeps the link alive and judged."""
+        now_ns = self._clock()  # before looking: what a pause of this process kept waiting is no silence
+        self._receive()
+        self._tend(now_ns)
+        samples = tuple(self._samples)
+        self._samples.clear()
+        return samples
+
+    def command(self, wanted: BodyTwist) -> BodyTwist:
+        """Send a velocity (m/s, m/s, rad/s, BODY frame); return what was really sent.
+
+        Zero is sent instead when the link has been quiet for 0.1 s, and zero is returned when nothing could be sent
+        (`health` says why): the base then stops by its own timeout. Raises ValueError unless finite.
+        """
+        payload = encode_twist(self._topic, self._type, wanted)
+        now_ns = self._clock()
+        if now_ns - self.newest_inbound_ns > FRESH_NS:
+            self._receive()  # perhaps only nobody has drained
+        self._tend(now_ns)
+        if not self._started or self._link is None:
+            return ZERO
+        if wanted != ZERO and now_ns - self.newest_inbound_ns > FRESH_NS:
+            self._counters["held_back"] += 1
+            wanted = ZERO
+            payload = encode_twist(self._topic, self._type, ZERO)
+        return wanted if self._send(payload) else ZERO
+
+    def health(self) -> DeviceHealth:
+        """Return link state, cause and counters; the rate is that of the pose."""
+        times = self._pose_times
+        span_ns = times[-1] - times[0] if len(times) > 1 else 0
+        rate_hz = (len(times) - 1) * NS_PER_S / span_ns if span_ns else 0.0
+        return DeviceHealth(self._state, self._cause, {**self._counters, **self._reader.counters}, rate_hz)
+
+    def stop(self) -> None:
+        """Send zero three times, if the link still stands."""
+        for _ in range(3):
+            if self._link is not None:
+                self._send(encode_twist(self._topic, self._type, ZERO))
+
+    def close(self) -> None:
+        """Close the connection within 0.05 s; the bridge forgets us by itself."""
+        link, self._link = self._link, None
+        self._started = False
+        if link is not None:
+            self._announce(link)
+            link.close()
+        self._state = LinkState.CLOSED
+
+    def _reset(self) -> None:
+        self._cause = ""
+        self._samples.clear()
+        self._pose_times.clear()
+        self._reader.reset()
+        self.newest_inbound_ns = self.newest_pong_ns = self.sent_ns = self._last_ping_ns = 0
+        self._unheard_ns = 0
+        self._counters = dict.fromkeys(self._counters, 0)
+
+    def _receive(self) -> None:
+        if self._link is None:
+            return
+        try:
+            texts = self._link.receive()
+        except LinkLost as lost:
+            self._give_up(str(lost))
+            return
+        self.newest_pong_ns = self._link.newest_pong_ns
+        for text, received_ns in texts:
+            self._counters["messages"] += 1
+            try:
+                frame = decode_frame(text)
+                if not isinstance(frame, Published):
+                    continue
+                self.newest_inbound_ns = received_ns
+                samples = self._reader.read(frame, received_ns)
+            except ValueError:
+                self._counters["undecodable"] += 1
+                continue
+            for sample in samples:
+                if isinstance(sample.value, BasePose):
+                    self._pose_times.append(received_ns)
+                elif isinstance(sample.value, CommandEcho):
+                    self._unheard_ns = 0
+                if len(self._samples) == MAX_PENDING:
+                    self._samples.popleft()
+                    self._counters["dropped_samples"] += 1
+                self._samples.append(sample)
+
+    def _tend(self, now_ns: int) -> None:
+        if self._link is None or not self._started:
+            return
+        if now_ns - self.newest_inbound_ns > LINK_STALE_NS:
+            self._give_up(f"no message from the bridge for {LINK_STALE_NS / NS_PER_S:g} s")
+        elif self._unheard_ns and now_ns - self._unheard_ns > LINK_STALE_NS:  # they wait somewhere, or are thrown away
+            self._give_up(f"the bridge gave back none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
+        elif now_ns - self._last_ping_ns >= PING_PERIOD_NS:
+            self._last_ping_ns = now_ns
+            self._counters["pings"] += 1
+            try:
+                self._link.send_ping(now_ns.to_bytes(8, "big"))
+            except LinkLost as lost:
+                self._give_up(str(lost))
+
+    def _send(self, payload: bytes) -> bool:
+        if self._link is None:
+            return False
+        try:
+            self._link.send_text(payload)
+        except LinkLost as lost:
+            self._give_up(str(lost))
+            return False
+        self.sent_ns = self._clock()
+        if self._reader.counters["echo"] and not self._unheard_ns:  # before the first, ROS may still be connecting
+            self._unheard_ns = self.sent_ns
+        self._counters["sent"] += 1
+        return True
+
+    def _give_up(self, cause: str) -> None:
+        """Reset the connection, so that nothing still on its way is delivered later; never reopened from here."""
+        link, self._link = self._link, None
+        self._started = False
+        if link is not None:
+            self._announce(link)
+            link.abort()
+        self._state = LinkState.LOST
+        self._cause = cause
+
+    def _announce(self, link: WebSocketLink) -> None:
+        if self.before_close is not None:
+            self.before_close(link.fileno())

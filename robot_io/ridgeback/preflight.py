@@ -1,0 +1,80 @@
+"""Asks the bridge, before anything moves, what it would never say by itself: are names and types right, who listens.
+
+A bridge drops a message of the wrong type in silence, so a typing error in the rig file would look like a base
+that does not move. The answers come from the `rosapi` node; without it the checks are left out and counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robot_io.clock import NS_PER_S, ClockNs
+from robot_io.errors import DeviceNotReady, DeviceProtocolError
+from robot_io.ridgeback.rosbridge_codec import (
+    ServiceAnswer,
+    decode_frame,
+    decode_subscribers,
+    decode_topic_type,
+    encode_call,
+    type_fits,
+)
+from robot_io.ridgeback.websocket_link import WebSocketLink
+
+ROSAPI_TIMEOUT_S = 1.0
+
+_WHO_LISTENS = "subscribers"
+
+
+def check_topics(
+    link: WebSocketLink, where: str, command_topic: str, types: Mapping[str, str], clock: ClockNs
+) -> list[str]:
+    """Check the type of every topic of `types` and that somebody listens to `command_topic`; takes at most 1 s.
+
+    Returns the questions that nobody answered. Raises DeviceProtocolError (a topic carries another type),
+    DeviceNotReady (nobody listens to the commands) and `LinkLost`.
+    """
+    link.send_text(encode_call(_WHO_LISTENS, "/rosapi/subscribers", {"topic": command_topic}))
+    for topic in types:
+        link.send_text(encode_call(f"type:{topic}", "/rosapi/topic_type", {"topic": topic}))
+    waiting = {_WHO_LISTENS, *(f"type:{topic}" for topic in types)}
+    unanswered: list[str] = []
+    until_ns = clock() + int(ROSAPI_TIMEOUT_S * NS_PER_S)
+    listeners: list[str] | None = None
+    while waiting and link.wait_readable(until_ns):
+        for text, _ in link.receive():
+            answer = _answer(text)
+            if answer is None or answer.call_id not in waiting:
+                continue
+            waiting.discard(answer.call_id)
+            try:
+                if answer.call_id == _WHO_LISTENS:
+                    listeners = decode_subscribers(answer.values)
+                else:
+                    topic = answer.call_id.removeprefix("type:")
+                    _check_type(where, topic, types[topic], decode_topic_type(answer.values))
+            except ValueError:  # no rosapi: the call failed, and its values are a sentence
+                unanswered.append(answer.call_id)
+    if listeners is not None and not [node for node in listeners if "rosbridge" not in node]:
+        raise DeviceNotReady(
+            f"nobody listens to the command topic {command_topic}",
+            where=where,
+            do="Start the base's software (twist_mux and the wheel controller), or correct base.topics.command",
+        )
+    return unanswered + sorted(waiting)
+
+
+def _answer(text: bytes) -> ServiceAnswer | None:
+    try:
+        frame = decode_frame(text)
+    except ValueError:
+        return None
+    return frame if isinstance(frame, ServiceAnswer) else None
+
+
+def _check_type(where: str, topic: str, ours: str, reported: str) -> None:
+    if reported and not type_fits(ours, reported):  # "": nobody has named this topic yet
+        raise DeviceProtocolError(
+            f"{topic} carries {reported}, the rig file says {ours}",
+            where=where,
+            do="Correct the type (or ros_version) under [base.topics]",
+        )

@@ -1,0 +1,111 @@
+"""Tables to typed settings, with every mistake found, not only the first.
+
+msgspec stops at the first mistake of a call; here each value is converted on its own, so that a person sees
+all mistakes of a file at once, each with its place and, for an unknown key, the nearest known one.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TypeVar, get_args, get_origin
+
+import msgspec
+
+from robot_io.errors import ConfigError
+from robot_io.rig.toml import KeyPath, Origins
+
+T = TypeVar("T", bound=msgspec.Struct)
+Origin = Callable[[KeyPath], str]
+Mistakes = list[tuple[str, str]]
+"""Place and sentence of each."""
+
+
+def build(kind: type[T], data: Mapping[str, Any], origins: Origins, name: str) -> T:
+    """Convert nested tables to `kind`.
+
+    `origins` says where each key was written and `name` is the file's. Raises ConfigError listing every
+    unknown key, missing key, wrong type, value out of range and number that is not finite.
+    """
+    mistakes: Mistakes = []
+    built = _build(kind, data, (), lambda path: _origin(path, origins, name), mistakes)
+    if mistakes:
+        if len(mistakes) == 1:
+            where, what = mistakes[0]
+            raise ConfigError(what, where=where)
+        listed = "\n".join(f"  {where}: {what}" for where, what in mistakes)
+        raise ConfigError(f"{len(mistakes)} mistakes\n{listed}", where=name)
+    return msgspec.convert(built, kind)
+
+
+def _origin(path: KeyPath, origins: Origins, name: str) -> str:
+    """Return where `path`, or else the nearest table around it, was written."""
+    for depth in range(len(path), 0, -1):
+        if path[:depth] in origins:
+            return origins[path[:depth]]
+    return name
+
+
+def _build(
+    kind: type[msgspec.Struct], data: Mapping[str, Any], path: KeyPath, origin: Origin, mistakes: Mistakes
+) -> dict[str, Any]:
+    fields = {field.name: field for field in msgspec.structs.fields(kind)}
+    built: dict[str, Any] = {}
+    for key, value in data.items():
+        here = (*path, key)
+        if key not in fields:
+            mistakes.append((origin(here), f"unknown key `{'.'.join(here)}`{_nearest(key, list(fields))}"))
+        elif _is_table(fields[key].type):
+            if isinstance(value, Mapping):
+                built[key] = _build(fields[key].type, value, here, origin, mistakes)
+            else:
+                mistakes.append((origin(here), f"`{'.'.join(here)}` is a table, not a value"))
+        elif problem := _problem(fields[key].type, value):
+            mistakes.append((origin(here), f"`{'.'.join(here)}` = {_short(value)}: {problem}"))
+        else:
+            built[key] = value
+    for key, field in fields.items():
+        if key not in data and field.required:
+            mistakes.append((origin(path), f"`{'.'.join((*path, key))}` is missing"))
+    return built
+
+
+def _is_table(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+
+
+def _problem(kind: Any, value: Any) -> str:
+    """Return what is wrong with `value` as a `kind`, or an empty string."""
+    try:
+        converted = msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        if choices := _choices(kind):
+            return f"expected one of {', '.join(map(str, choices))}"
+        return str(error).replace("Expected", "expected").replace(" - at `$", " at `")
+    except OverflowError:
+        return "this number is too large"
+    return "" if _finite(converted) else "this number is not finite"
+
+
+def _choices(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) is Literal else ()
+
+
+def _finite(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return all(_finite(item) for item in value)
+    return not isinstance(value, float) or math.isfinite(value)
+
+
+def _nearest(key: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+    return f", did you mean `{near[0]}`?" if near else f" (known here: {', '.join(known)})"
+
+
+def _short(value: Any) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # Python does not write integers of thousands of digits
+        text = "a number of thousands of digits"
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,256 @@
+"""The rig file: TOML to typed, frozen settings with the unit in every key and the range in every type.
+
+`load_rig` reads a shipped name (`sim`, `emulated`, `thing`, ...) or a path. All mistakes of a file are reported
+at once, each with its line; an unknown key names the nearest known one. A file may say `extends = "emulated"`
+and then holds only what differs.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from robot_io.errors import ConfigError
+from robot_io.rig import toml as toml_text
+from robot_io.rig.checks import build
+from robot_io.rig.toml import Origins
+from robot_io.rig.topics import TopicsConfig
+from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Positive, Table
+from robot_io.rig.world import WorldConfig
+
+RIGS_DIR = Path(__file__).parent
+
+
+class LoopConfig(Table, frozen=True):
+    """Rate of the control loop; below 50 Hz the gate would take a single late tick for silence."""
+
+    rate_hz: Annotated[float, Meta(ge=50, le=500)] = 100.0
+
+
+class FtConfig(Table, frozen=True):
+    """The FT 300. `port`: a device path, a pty or `socket://host:port`; empty at levels sim and emulated."""
+
+    level: Level = "emulated"
+    port: str = ""
+    tare_seconds_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
+    """How long the tare is averaged, at 100 readings a second."""
+    noise_force_N: NonNegative = 1.2
+    """Noise of the sensor, one standard deviation of a force axis (FT 300 product sheet: 1.2 N)."""
+    noise_torque_Nm: NonNegative = 0.03
+    """The same of a torque axis."""
+
+
+class ArmConfig(Table, frozen=True):
+    """The UR10. `hold = "monitor"` sends nothing to the arm; `"servo"` holds it actively (see the safety page)."""
+
+    level: Level = "emulated"
+    host: str = ""
+    hold: Literal["monitor", "servo"] = "monitor"
+    held_pose_rad: Joints = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.3100)
+    """Joints for which `[frames]` is given; an arm that is elsewhere is refused (R04)."""
+    held_pose_tolerance_rad: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
+    """How far the measured joints may be from `held_pose_rad` at start."""
+
+
+class BaseConfig(Table, frozen=True):
+    """The Ridgeback over rosbridge. `pose_source` says which topic localises the base."""
+
+    level: Level = "emulated"
+    url: str = ""
+    pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
+    """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
+    pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
+    """How often poses come: late after 3 periods, at least 50 ms, and lost after 6, at least 120 ms (F40)."""
+    topics: TopicsConfig = TopicsConfig()
+
+
+class FramesConfig(Table, frozen=True):
+    """Constants of the rig, because the arm is held.
+
+    base_from_sensor: rotation, rows; its columns are the sensor's x, y, z axes in the BODY frame.
+    contact_in_base_m: centre of the contact ball in the BODY frame.
+    sensor_in_base_m: origin of the sensor frame in the BODY frame.
+    base_from_marker: x (m), y (m), yaw (rad) of the motion-capture marker frame in the BODY frame.
+    """
+
+    base_from_sensor: Matrix3
+    contact_in_base_m: InBase
+    sensor_in_base_m: InBase
+    base_from_marker: InBase = (0.0, 0.0, 0.0)
+
+
+class PathConfig(Table, frozen=True):
+    """The straight path in the WORLD frame: a point on it (from which distance is expected) and its direction."""
+
+    origin_m: InRoom = (0.0, 0.0)
+    direction_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
+    expected_contact_m: Annotated[float, Meta(ge=0, le=2)] = 0.05
+    """Distance from where the approach starts to where the object is expected."""
+
+
+class SlidersConfig(Table, frozen=True):
+    """What this rig is meant to push, boxes and barrels: `push run` warns of gains with little margin for some."""
+
+    shortest_m: Positive = 0.3
+    """Length along the push, or diameter, of the smallest ..."""
+    longest_m: Positive = 0.5
+    """... and of the largest."""
+    pressure: Literal["uniform", "rim", "point"] = "uniform"
+
+
+class ControlConfig(Table, frozen=True):
+    """Gains and speeds of the push."""
+
+    controller: Literal["force", "open-loop"] = "force"
+    k_f: Annotated[float, Meta(ge=0, le=2)] = 0.3
+    k_y_rad_per_m: Annotated[float, Meta(ge=0, le=2)] = 0.2
+    push_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.1
+    approach_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
+    ramp_s: Annotated[float, Meta(ge=0.1, le=10)] = 1.0
+    """Time from rest to full speed, and back."""
+    distance_m: Annotated[float, Meta(gt=0, le=1000)] = 2.0
+    """Along the path, from first contact to the contact point."""
+    force_filter_tau_s: Annotated[float, Meta(ge=0, le=2)] = 0.05
+    """Time constant of the low-pass on the force; 0: none."""
+    force_min_N: Annotated[float, Meta(gt=0, le=50)] = 5.0
+    """Below this horizontal force there is no contact."""
+    contact_samples: Annotated[int, Meta(ge=1, le=100)] = 5
+    """So many readings in a row above `force_min_N` are contact."""
+    heading_gain_per_s: Annotated[float, Meta(ge=0, le=5)] = 1.0
+    """Turn rate for each radian that the base has turned away from its heading at the start ..."""
+    max_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=0.25)] = 0.1
+    """... and the most of it."""
+    lost_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=1)] = 0.2
+    """Without contact the push turns back over the path this fast ..."""
+    lost_time_s: Annotated[float, Meta(gt=0, le=10)] = 3.0
+    """... for at most this long ..."""
+    lost_distance_m: Annotated[float, Meta(gt=0, le=2)] = 0.3
+    """... or this far, then the base holds ..."""
+    lost_rest_s: Annotated[float, Meta(gt=0, le=60)] = 2.0
+    """... and the run ends after this long at rest, unless the operator resumes."""
+    retreat_m: Annotated[float, Meta(ge=0, le=0.2)] = 0.05
+    """How far the base backs off after the push, so that the sensor can be checked out of contact (0: not at all)."""
+
+
+class LimitsConfig(Table, frozen=True):
+    """Limits of this rig; the program's own ceilings (`safety/limits.py`) may only be lowered."""
+
+    max_force_N: Positive = 150.0
+    """Force beyond the tare, all three axes, at which the run stops (F50)."""
+    slow_force_N: Positive = 100.0
+    """From here on half the speed."""
+    max_torque_Nm: Positive = 20.0
+    """Torque beyond the tare at which the run stops (F51)."""
+    envelope_factor: Annotated[float, Meta(gt=1, le=3)] = 1.5
+    """Commands may be this many times the push speed, never above 0.75 m/s."""
+    max_acceleration_m_per_s2: Annotated[float, Meta(gt=0, le=2.5)] = 1.0
+    max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
+    max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
+    """Turned away this far from its heading at the start, the base stops (F44)."""
+    hold_slow_rad: Positive = 0.005
+    """Drift of an arm joint at which the base holds ..."""
+    hold_stop_rad: Positive = 0.01
+    """... and at which it stops (F20)."""
+
+
+class RigConfig(Table, frozen=True):
+    """One robot, real or not: its devices, frames, path, gains, limits and, where simulated, its world."""
+
+    name: str
+    frames: FramesConfig
+    description: str = ""
+    loop: LoopConfig = LoopConfig()
+    ft: FtConfig = FtConfig()
+    arm: ArmConfig = ArmConfig()
+    base: BaseConfig = BaseConfig()
+    path: PathConfig = PathConfig()
+    sliders: SlidersConfig = SlidersConfig()
+    control: ControlConfig = ControlConfig()
+    limits: LimitsConfig = LimitsConfig()
+    world: WorldConfig = WorldConfig()
+
+
+def shipped_rigs() -> list[str]:
+    """Return the names of the rigs that come with the program."""
+    return sorted(path.stem for path in RIGS_DIR.glob("*.toml"))
+
+
+def load_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
+    """Load a shipped rig by name, or a file by path, with `key=value` settings laid over it.
+
+    A value of `overrides` is TOML (`control.k_f=0.1`, `path.direction_deg=-30`); what is not TOML is a string.
+    Raises ConfigError (no such rig, unknown key, value out of range, not finite) and UsageError (bad override).
+    """
+    path = _find(name_or_path)
+    data, origins = _read(path, ())
+    _lay_over(data, origins, overrides)
+    return build(RigConfig, data, origins, str(path))
+
+
+def rig_to_toml(rig: RigConfig) -> str:
+    """Write the whole resolved rig as TOML; `rig_from_toml` gives back an equal rig, every float bit for bit."""
+    return toml_text.emit(msgspec.to_builtins(rig))
+
+
+def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = ()) -> RigConfig:
+    """Read what `rig_to_toml` wrote, with `key=value` settings laid over it.
+
+    Raises ConfigError (with `name` as its place) when it is anything else, and as `load_rig` for the settings.
+    """
+    data, origins = toml_text.parse(text, name)
+    _lay_over(data, origins, overrides)
+    return build(RigConfig, data, origins, name)
+
+
+def _lay_over(data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str]) -> None:
+    for setting in overrides:
+        key, value = toml_text.parse_setting(setting)
+        toml_text.put(data, key, value)
+        origins[key] = f"--set {'.'.join(key)}"
+
+
+def _find(name_or_path: str | Path) -> Path:
+    text = str(name_or_path)
+    if text in (shipped := shipped_rigs()):
+        return RIGS_DIR / f"{text}.toml"
+    path = Path(text)
+    if _is_file(path):
+        return path
+    if path.suffix == ".toml" or "/" in text:
+        raise ConfigError("there is no such rig file", where=text)
+    near = difflib.get_close_matches(text, shipped, n=1)
+    hint = f"Did you mean `{near[0]}`? " if near else ""
+    raise ConfigError(
+        f"there is no rig named `{text}`", do=f"{hint}Shipped rigs: {', '.join(shipped)}; or give the path of a file"
+    )
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError as error:  # a folder that is not ours to look into, a name that is too long
+        raise ConfigError(f"cannot read it: {error.strerror}", where=str(path)) from None
+
+
+def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
+    """Return the tables of `path` laid over those of the rig it extends, and where each key was written."""
+    if path.resolve() in seen:
+        raise ConfigError("this rig extends itself", where=str(path))
+    try:
+        text = path.read_text(encoding="utf-8-sig")  # a byte order mark, as some editors write, is no mistake
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"cannot read it: {error}", where=str(path)) from None
+    data, origins = toml_text.parse(text, str(path))
+    if "extends" not in data:
+        return data, origins
+    base = data.pop("extends")
+    if not isinstance(base, str):
+        raise ConfigError("`extends` names a rig: a shipped name or a path", where=origins.get(("extends",), str(path)))
+    beside = path.parent / base
+    below, below_origins = _read(beside if _is_file(beside) else _find(base), (*seen, path.resolve()))
+    return toml_text.merge(below, data), below_origins | origins

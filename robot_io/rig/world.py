@@ -1,0 +1,91 @@
+"""The simulated world of a rig file: `[world]` and its tables, used at levels sim and emulated."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from robot_io.rig.types import NonNegative, Positive, Table, Vector2, Vector3, Vector6
+
+
+class SliderConfig(Table, frozen=True):
+    """The object in the simulated world. `width_m` is along a rectangle's pushed face; a circle uses `radius_m`."""
+
+    shape: Literal["rectangle", "circle"] = "rectangle"
+    length_m: Positive = 0.40
+    width_m: Positive = 0.40
+    radius_m: Positive = 0.25
+    mass_kg: Positive = 5.1
+    floor_friction: Annotated[float, Meta(gt=0, le=2)] = 0.30
+    contact_friction: Annotated[float, Meta(ge=0, le=2)] = 0.30
+    pressure: Literal["uniform", "rim", "point"] = "uniform"
+    """`uniform` by the integral in the paper, `rim` at the greatest distance, `point` a tenth of uniform."""
+    cof_m: Vector2 = (0.0, 0.0)
+    """Centre of friction, from the middle: along the push and to the left (a load that is not in the middle)."""
+
+
+class FloorConfig(Table, frozen=True):
+    """What the floor of the simulated world does beyond an even ellipsoid of friction; nothing by default."""
+
+    push_height_m: Annotated[float, Meta(ge=0, le=2)] = 0.0
+    """Height of the push above the floor: moves the pressure ahead, by this times the floor's friction."""
+    turning: Literal["ellipsoid", "along-push"] = "ellipsoid"
+    """What resists turning: the greatest torque, or (right while sliding straight) the pressure along the push."""
+    along_over_across: Annotated[float, Meta(ge=0.5, le=2)] = 1.0
+    """Friction along the path over friction across it."""
+    patch_strength: Annotated[float, Meta(ge=0, le=0.9)] = 0.0
+    """How much the friction varies from place to place, relative to its mean; each seed is another floor."""
+    patch_m: Annotated[float, Meta(ge=0.01, le=10)] = 0.3
+    """About how large a patch is."""
+
+
+class StartConfig(Table, frozen=True):
+    """Where things stand in the simulated world before the approach, relative to the path."""
+
+    lateral_offset_m: float = 0.05
+    """Lateral offset of the contact ball from the path (left positive)."""
+    edge_offset_m: float = 0.03
+    """Where on the object's pushed face the ball will meet it, from the middle (left positive)."""
+    heading_deg: float = 3.0
+    """Heading of the object relative to the path."""
+    gap_m: NonNegative = 0.05
+    """Free distance between ball and object along the path; 0 with `--start-in-contact`."""
+    spread: Annotated[float, Meta(ge=0, le=1)] = 0.2
+    """How much each seed varies the three offsets above (0: not at all; 0.2: by up to 20 %)."""
+
+
+class SensorModelConfig(Table, frozen=True):
+    """How the simulated FT 300 errs: bias (N, N*m, sensor frame), tool weight and its centre, noise (1 sigma)."""
+
+    bias: Vector6 = (-20.68, 21.95, -48.70, -0.097, 1.172, -0.321)
+    tool_mass_kg: NonNegative = 0.6
+    tool_com_in_sensor_m: Vector3 = (0.0, 0.0, 0.06)
+    noise_force_N: NonNegative = 1.2
+    """The product sheet's figure for its noisiest force axes; sensors at rest were seen to read quieter (0.2 N)."""
+    noise_torque_Nm: NonNegative = 0.03
+    rate_hz: Annotated[float, Meta(ge=20, le=120)] = 100.016
+    phase: Annotated[float, Meta(ge=0, lt=1)] = 0.37
+    latency_ms: Annotated[int, Meta(ge=0, le=16)] = 1
+    """Latency timer of the emulated USB adapter: 0, 1 or 16 ms."""
+
+
+class WorldConfig(Table, frozen=True):
+    """The simulated world, used at levels sim and emulated."""
+
+    solver: Literal["exact", "osqp"] = "exact"
+    """The closed form, or the paper's program by OSQP (to 1e-6 the same, and much slower)."""
+    ball_radius_m: Annotated[float, Meta(ge=0.001, le=0.2)] = 0.05
+    """Radius of the contact ball."""
+    slider: SliderConfig = SliderConfig()
+    floor: FloorConfig = FloorConfig()
+    start: StartConfig = StartConfig()
+    sensor: SensorModelConfig = SensorModelConfig()
+    arm_rate_hz: Annotated[float, Meta(ge=20, le=125.5)] = 124.99
+    """Cycle of the emulated controller as a clock outside sees it."""
+    arm_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.21
+    """Where in a period a device samples, so that no run tests one frozen phase; likewise the others."""
+    base_tick_rate_error: Annotated[float, Meta(ge=-0.01, le=0.01)] = 0.0001
+    """Relative error of the base's clock (0.0001: 25.0025 Hz)."""
+    base_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.53
+    mocap_rate_hz: Annotated[float, Meta(ge=5, le=200)] = 100.007

@@ -1,0 +1,298 @@
+"""An FT 300 on a pty, byte for byte: Modbus slave, data stream, line speed, USB latency timer, and its bad days.
+
+Runs inside an `EventLoop`: one thread, nothing blocks. Samples are taken on the sensor's own clock (rate error
+and phase) and asked of an `FtSource`. Where Robotiq's documents are silent, a knob (`Ft300Knobs`)
+says what is assumed.
+"""
+
+from __future__ import annotations
+
+import termios
+from collections.abc import Callable
+
+from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
+from robot_io.ipc.event_loop import EventLoop, Timer
+from sim_backend.ft300 import wire
+from sim_backend.ft300.knobs import Ft300Knobs
+from sim_backend.ft300.line import WireDirection, next_delivery_ns
+from sim_backend.ft300.pty import READ_BYTES, PtyPort
+from sim_backend.ft300.registers import OUTPUT_STREAM, SensorRegisters
+from sim_backend.world.plant import FtSource
+
+RX_STEP_NS = 2 * NS_PER_MS
+REQUEST_PAUSE_NS = 10 * NS_PER_MS
+"""A request begun and not continued for this long is forgotten."""
+TOO_LATE_NS = 50 * NS_PER_MS
+"""After a pause of the host longer than this, missed samples are skipped, not sent in a burst."""
+
+
+class Ft300Emulator:
+    """An FT 300 at `port`, fed by `source`.
+
+    rate_hz, phase: samples at (k + phase) / rate_hz of the monotonic clock. latency_ms: 0, 1 or 16. streaming:
+    found streaming, as after a client that crashed. link: a stable name for the pty. `knobs` may be replaced
+    while it runs (`paced` excepted).
+    """
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        source: FtSource,
+        *,
+        rate_hz: float = 100.016,
+        phase: float = 0.37,
+        latency_ms: int = 1,
+        streaming: bool = False,
+        link: str | None = None,
+        firmware: str = "FTS-1.2.3",
+        serial: str = "FTA-12345",
+        year: int = 2018,
+        acceleration_g: tuple[float, float, float] = (0.0, 0.0, -1.0),
+        knobs: Ft300Knobs | None = None,
+    ) -> None:
+        self.knobs = knobs or Ft300Knobs()
+        self.latency_ms = latency_ms
+        self._loop = loop
+        self._source = source
+        self._period_ns = NS_PER_S / rate_hz
+        self._phase = phase
+        self._streams_at_boot = streaming
+        self._streaming = streaming
+        self._registers = SensorRegisters(firmware, serial, year, acceleration_g)
+        self._port = PtyPort(loop, self._on_bytes, self._on_sent, link)
+        self._to_host = WireDirection(paced=self.knobs.paced)
+        self._to_sensor = WireDirection(paced=self.knobs.paced)
+        self._scanner = wire.RequestScanner()
+        self._baud_fits = False
+        self._sample_index = 0
+        self._timers: dict[str, Timer] = {}
+        self._stop_bytes_seen = 0
+        self._modbus_from_ns = 0
+        self._stalled_until_ns = 0
+        self._heard_until_ns = 0
+        self._packets = 0
+        self._counted = dict.fromkeys(
+            ("samples", "samples_skipped", "packets_sent", "packets_withheld", "bytes_delivered", "bytes_lost",
+             "bytes_garbled", "requests", "starts", "stops"), 0
+        )  # fmt: skip
+
+    @property
+    def port(self) -> str:
+        """Path of the pty's slave ("" while hung up)."""
+        return self._port.path
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened so far, by name."""
+        return {**self._counted, "attaches": self._port.attaches, "junk_bytes": self._scanner.junk_bytes}
+
+    @property
+    def streaming(self) -> bool:
+        """Whether the sensor is in stream mode."""
+        return self._streaming
+
+    def start(self) -> None:
+        """Appear: create the pty, begin to measure."""
+        self._port.open()
+        now_ns = monotonic_ns()
+        self._registers.counts = wire.to_counts(self._source.read_ft(now_ns))
+        self._sample_index = int(now_ns / self._period_ns - self._phase) + 1
+        self._at("sample", self._sample_ns(), self._on_sample)
+
+    def close(self) -> None:
+        """Vanish; idempotent."""
+        for timer in self._timers.values():
+            timer.cancel()
+        self._timers.clear()
+        self._port.close()
+
+    def stall(self, duration_s: float) -> None:
+        """Say and hear nothing for a while, then go on as if nothing had been."""
+        self._stalled_until_ns = monotonic_ns() + int(duration_s * NS_PER_S)
+
+    def hang_up(self, return_after_s: float | None = None, *, power_cycled: bool = False) -> None:
+        """Unplug the adapter; plug it in again later, at another pty under the same link.
+
+        The sensor has its own supply: without `power_cycled` it is found as it was left.
+        """
+        self._port.close()
+        self._to_host.clear()
+        self._to_sensor.clear()
+        self._scanner.clear()
+        if power_cycled:
+            self._streaming = self._streams_at_boot
+            self._registers.output = 0
+        if return_after_s is not None:
+            self._at("return", monotonic_ns() + int(return_after_s * NS_PER_S), lambda _: self._port.open())
+
+    # The sensor's own clock: it measures whether or not anyone listens.
+
+    def _sample_ns(self) -> int:
+        return round((self._sample_index + self._phase) * self._period_ns)
+
+    def _on_sample(self, sample_ns: int) -> None:
+        self._registers.counts = wire.to_counts(self._source.read_ft(sample_ns))
+        self._look_at_baud()
+        self._counted["samples"] += 1
+        if self._streaming and not self._is_stalled(sample_ns):
+            self._send_packet(sample_ns)
+        self._sample_index += 1
+        late_ns = monotonic_ns() - self._sample_ns()
+        if late_ns > TOO_LATE_NS:
+            skipped = int(late_ns / self._period_ns) + 1
+            self._sample_index += skipped
+            self._counted["samples_skipped"] += skipped
+        self._at("sample", self._sample_ns(), self._on_sample)
+
+    def _send_packet(self, sample_ns: int) -> None:
+        self._packets += 1
+        knobs = self.knobs
+        if self._to_host.is_busy(sample_ns) or self._is_turn(knobs.drop_packet_every):
+            self._counted["packets_withheld"] += 1
+            return
+        packet = bytearray(wire.stream_packet(self._registers.counts))
+        if self._is_turn(knobs.corrupt_every):
+            packet[5] ^= 0x10
+        if self._is_turn(knobs.drop_byte_every):
+            del packet[7]
+        if self._is_turn(knobs.insert_byte_every):
+            packet.insert(9, 0x20)
+        self._counted["packets_sent"] += 1
+        self._send(bytes(packet), sample_ns)
+
+    def _is_turn(self, every: int) -> bool:
+        return every > 0 and self._packets % every == 0
+
+    # From the sensor to the host: line, adapter, pty.
+
+    def _send(self, data: bytes, at_ns: int) -> None:
+        self._to_host.put(data, at_ns)
+        self._schedule_delivery()
+
+    def _schedule_delivery(self) -> None:
+        # While nobody listens, one wake-up a packet will do.
+        arrival_ns = self._to_host.next_ns() if self._port.attached else self._to_host.free_ns
+        if len(self._to_host) and arrival_ns is not None and "deliver" not in self._timers:
+            self._at("deliver", next_delivery_ns(arrival_ns, self.latency_ms), self._on_delivery)
+
+    def _on_delivery(self, deadline_ns: int) -> None:
+        # What is due now: after a late wake-up, all that the adapter would have handed over since.
+        timer_ns = max(self.latency_ms, 1) * NS_PER_MS
+        due_ns = monotonic_ns() // timer_ns * timer_ns if self.latency_ms else monotonic_ns()
+        began_ns = self._to_host.next_began_ns() or deadline_ns
+        data = self._to_host.take(max(due_ns, deadline_ns))
+        if self.knobs.collisions and self._to_sensor.free_ns > began_ns:
+            data = self._garbled(data)
+        if not self._baud_fits:
+            data = self._garbled(data)
+        taken = self._port.write(data)
+        self._counted["bytes_delivered"] += taken
+        self._counted["bytes_lost"] += len(data) - taken
+        self._schedule_delivery()
+
+    def _garbled(self, data: bytes) -> bytes:
+        self._counted["bytes_garbled"] += len(data)
+        return bytes(byte * 167 + 13 & 0xFF for byte in data)
+
+    def _look_at_baud(self) -> None:
+        self._baud_fits = bool(self._port.path) and self._port.baud_is(termios.B19200)
+
+    # From the host to the sensor.
+
+    def _on_bytes(self, data: bytes) -> None:
+        self._look_at_baud()
+        if not self._baud_fits:
+            data = self._garbled(data)
+        self._to_sensor.put(data, monotonic_ns())
+        if self._to_sensor.room < READ_BYTES:
+            self._port.pause()
+        self._schedule_hearing()
+
+    def _on_sent(self) -> None:
+        """Hear at once what is still on its way: a real client waited for that before its port was closed."""
+        now_ns = monotonic_ns()
+        began_ns = self._to_sensor.next_began_ns()
+        data = self._to_sensor.take(self._to_sensor.free_ns)
+        self._to_sensor.clear()
+        if began_ns is not None and not self._is_stalled(now_ns):
+            self._hear(data, began_ns, now_ns)
+
+    def _schedule_hearing(self) -> None:
+        if len(self._to_sensor) and "hear" not in self._timers:
+            heard_ns = min(self._to_sensor.free_ns, monotonic_ns() + RX_STEP_NS)
+            self._at("hear", heard_ns, self._on_hearing)
+
+    def _on_hearing(self, _deadline_ns: int) -> None:
+        now_ns = monotonic_ns()
+        began_ns = self._to_sensor.next_began_ns()
+        data = self._to_sensor.take(now_ns)
+        if self._to_sensor.room >= READ_BYTES:
+            self._port.resume()
+        if data and began_ns is not None and not self._is_stalled(now_ns):
+            self._hear(data, began_ns, now_ns)
+        self._schedule_hearing()
+
+    def _hear(self, data: bytes, began_ns: int, now_ns: int) -> None:
+        # Pauses are those of the line: a host that was held up and hears late has not paused.
+        pause_ns = began_ns - self._heard_until_ns
+        self._heard_until_ns = min(self._to_sensor.free_ns, now_ns)
+        if self._streaming:
+            data = self._look_for_stop(data, now_ns)
+        if data and now_ns >= self._modbus_from_ns:
+            if pause_ns > REQUEST_PAUSE_NS:
+                self._scanner.clear()
+            for request in self._scanner.feed(data):
+                self._counted["requests"] += 1
+                self._serve(request, now_ns)
+
+    def _look_for_stop(self, data: bytes, now_ns: int) -> bytes:
+        """Count 0xFF; whatever else is said to a streaming sensor is ignored. Return what came after the stop."""
+        for index, byte in enumerate(data, 1):
+            self._stop_bytes_seen = self._stop_bytes_seen + 1 if byte == wire.STOP_BYTE else 0
+            if self._stop_bytes_seen >= self.knobs.stop_bytes:
+                self._streaming = False
+                self._registers.output = 0
+                self._counted["stops"] += 1
+                self._modbus_from_ns = now_ns + _ns(self.knobs.mode_change_ms)
+                return data[index:]
+        return b""
+
+    def _serve(self, request: bytes, now_ns: int) -> None:
+        reply = self._registers.serve(request)
+        selected = reply.selected
+        if selected is not None:
+            self._at(
+                "answer",
+                now_ns + _ns(self.knobs.ack_delay_ms),
+                lambda at_ns: self._select(selected, reply.answer, at_ns),
+            )
+        elif self.knobs.unknown == "exception" or not reply.is_refusal:
+            self._at("answer", now_ns + _ns(self.knobs.answer_delay_ms), lambda at_ns: self._send(reply.answer, at_ns))
+
+    def _select(self, selected: int, answer: bytes, at_ns: int) -> None:
+        self._registers.output = selected
+        if self.knobs.ack:
+            self._send(answer, at_ns)
+        if selected == OUTPUT_STREAM:
+            self._streaming = True
+            self._stop_bytes_seen = 0
+            self._counted["starts"] += 1
+
+    def _is_stalled(self, now_ns: int) -> bool:
+        return now_ns < self._stalled_until_ns
+
+    def _at(self, name: str, deadline_ns: int, callback: Callable[[int], None]) -> None:
+        """Call back once at `deadline_ns`, unless a timer of that name is set anew before."""
+
+        def fire(at_ns: int) -> None:
+            self._timers.pop(name, None)
+            callback(at_ns)
+
+        previous = self._timers.get(name)
+        if previous is not None:
+            previous.cancel()
+        self._timers[name] = self._loop.call_at(deadline_ns, fire)
+
+
+def _ns(milliseconds: float) -> int:
+    return int(milliseconds * NS_PER_MS)

@@ -1,0 +1,172 @@
+"""The pty that stands for an FT 300's serial port: who is listening, at which speed, under which name.
+
+The slave is not held open here, so that `fuser` shows the client only; the kernel then reports a hang-up while
+nobody has it open, and what is sent meanwhile is lost, as with a real port. Not modelled: parity (a pty refuses
+to set it), modem lines, and the depth of a real port's buffers (a pty keeps up to 64 kB for a client that has
+it open and does not read).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import termios
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+from robot_io.clock import NS_PER_MS
+from robot_io.errors import EnvironmentFault
+from robot_io.ipc.event_loop import HANGUP, READ, EventLoop, Timer
+
+LOOK_PERIOD_NS = 5 * NS_PER_MS
+READ_BYTES = 2048
+BAUD_AT_FIRST = termios.B9600
+"""A serial port's speed before anyone sets it (Linux)."""
+
+
+class PtyPort:
+    """A pty with its slave in raw mode, served in `loop`; bytes of the client go to `on_bytes`.
+
+    `on_sent` is called when the client has closed its port: closing a real one waits until all is sent (Linux).
+    """
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        on_bytes: Callable[[bytes], None],
+        on_sent: Callable[[], None],
+        link: str | None = None,
+    ) -> None:
+        self._loop = loop
+        self._on_bytes = on_bytes
+        self._on_sent = on_sent
+        self._link = Path(link) if link else None
+        self._master = -1
+        self._look: Timer | None = None
+        self._hang_up_poll = select.poll()
+        self._paused = False
+        self.path = ""
+        self.attached = False
+        self.attaches = 0
+
+    def open(self) -> None:
+        """Create the pty and its link. Raises EnvironmentFault: no pty to be had, or something at the link's place."""
+        if self._link is not None and self._link.exists() and not self._link.is_symlink():
+            raise EnvironmentFault(
+                "something that is no link is in the way", where=str(self._link), do="Choose another name"
+            )
+        try:
+            self._master, slave = os.openpty()
+        except OSError as error:
+            raise EnvironmentFault(
+                f"this machine gives no pseudo-terminal ({error})",
+                where="/dev/pts",
+                do="Mount devpts there, or close some terminals",
+            ) from error
+        # Before a byte is sent: a cooked line would echo the stream to its sender and change 0x0D to 0x0A.
+        tty.setraw(slave)
+        attributes = termios.tcgetattr(slave)
+        attributes[4] = attributes[5] = BAUD_AT_FIRST
+        termios.tcsetattr(slave, termios.TCSANOW, attributes)
+        self.path = os.ttyname(slave)
+        os.close(slave)
+        os.set_blocking(self._master, False)
+        self._hang_up_poll = select.poll()
+        self._hang_up_poll.register(self._master, select.POLLIN)  # a hang-up is reported unasked
+        if self._link is not None:
+            beside = self._link.with_name(f"{self._link.name}.{os.getpid()}")
+            beside.symlink_to(self.path)
+            beside.replace(self._link)
+        self._paused = False
+        self._await_client()
+
+    def close(self) -> None:
+        """Hang up: the client's port dies as an unplugged adapter does. Idempotent."""
+        if self._master < 0:
+            return
+        if self._look is not None:
+            self._look.cancel()
+            self._look = None
+        self._loop.remove_fd(self._master)
+        os.close(self._master)
+        self._master = -1
+        self.attached = False
+        if self._link is not None and self._link.is_symlink() and str(self._link.readlink()) == self.path:
+            self._link.unlink()
+        self.path = ""
+
+    def write(self, data: bytes) -> int:
+        """Send to the client; return how many bytes it took (the rest is lost: not open, or full)."""
+        if not self.attached:
+            return 0
+        try:
+            return os.write(self._master, data)
+        except OSError:  # full, or closed a moment ago
+            return 0
+
+    def baud_is(self, speed: int) -> bool:
+        """Return whether the client has set this speed (a termios constant)."""
+        _, _, _, _, input_speed, output_speed, _ = termios.tcgetattr(self._master)
+        return bool(input_speed == speed and output_speed == speed)
+
+    def pause(self) -> None:
+        """Take nothing from the client until `resume` (its output queue fills up meanwhile)."""
+        if self.attached and not self._paused:
+            self._paused = True
+            self._loop.set_events(self._master, 0)
+
+    def resume(self) -> None:
+        """Take bytes again."""
+        if self.attached and self._paused:
+            self._loop.set_events(self._master, READ)
+        self._paused = False
+
+    def _await_client(self) -> None:
+        self.attached = False
+        self._look = self._loop.call_every(LOOK_PERIOD_NS, self._on_look)
+
+    def _on_look(self, _deadline_ns: int) -> None:
+        """See whether somebody opened the slave: the hang-up is gone (a client that only listens sends nothing).
+
+        A client may have opened, written and closed it since the last look.
+        """
+        state = next((events for _, events in self._hang_up_poll.poll(0)), 0)
+        if state & select.POLLHUP:
+            while state & select.POLLIN and (data := self._read()):
+                self._on_bytes(data)
+                self._on_sent()
+            return
+        assert self._look is not None
+        self._look.cancel()
+        self._look = None
+        self.attached = True
+        self.attaches += 1
+        self._paused = False
+        self._loop.add_fd(self._master, self._on_ready)
+
+    def _on_ready(self, events: int) -> None:
+        if data := self._read() if events & (READ | HANGUP) else b"":
+            self._on_bytes(data)
+        if not events & HANGUP:
+            return
+        # At once: the client may open it again within a millisecond, and then the hang-up is gone.
+        while data := self._read():
+            self._on_bytes(data)
+        self._loop.remove_fd(self._master)
+        self._forget_unread()
+        self._on_sent()
+        self._await_client()
+
+    def _read(self) -> bytes:
+        with contextlib.suppress(OSError):  # EIO: the client closed it; EAGAIN: nothing
+            return os.read(self._master, READ_BYTES)
+        return b""
+
+    def _forget_unread(self) -> None:
+        """Drop what the client left unread: a real port does when it is closed, a pty keeps it for the next one."""
+        with contextlib.suppress(OSError):
+            slave = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+            termios.tcflush(slave, termios.TCIFLUSH)
+            os.close(slave)

@@ -1,0 +1,156 @@
+"""What the floor does under a pushed slider, beyond the paper's ellipsoid with a fixed centre.
+
+Four effects, each off by default: the pressure's centre runs ahead of the centre of mass when the push is above the
+floor; a slider pushed straight resists turning by the pressure's spread along the push; the floor resists more along
+one direction; and its friction varies from place to place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, hypot, inf, sin, sqrt
+from typing import Literal
+
+import msgspec
+
+from robot_io.errors import ConfigError
+from sim_backend.physics.floor_patches import FrictionField
+from sim_backend.physics.shapes import Circle, Moment, Point, Shape
+from sim_backend.physics.slider import POINT_SHARE_OF_UNIFORM, Pressure, SliderModel
+from sim_backend.physics.slider_exact import Grain
+
+Grip = tuple[float, float, float, float, Grain | None]
+"""Centre of friction x, y (m, BODY), d (m), f_max (N) and grain (BODY), at this moment."""
+
+SUPPORT_ACROSS = 6
+"""The pressure on a floor of patches is taken at the points of a grid of so many a side."""
+LOOK_AGAIN_M = 0.002
+"""The patches under the slider are looked up again when a point of it has moved about this far."""
+
+
+class FloorEffects(msgspec.Struct, frozen=True):
+    """Which effects there are and how strong.
+
+    shift_m: how far the centre of friction runs ahead along the push force: floor friction times push height.
+    turning: `ellipsoid` takes d from the greatest torque (right for spinning on the spot); `along-push` from the
+    pressure's mean square distance along the push (right for small turns while sliding straight).
+    along_over_across: friction along `grain_rad` (WORLD) over friction across it; f_max is the one along.
+    patch_strength (0 to below 1), patch_m, seed: see `FrictionField`.
+    """
+
+    shift_m: float = 0.0
+    turning: Literal["ellipsoid", "along-push"] = "ellipsoid"
+    along_over_across: float = 1.0
+    grain_rad: float = 0.0
+    patch_strength: float = 0.0
+    patch_m: float = 0.3
+    seed: int = 0
+
+
+class Floor:
+    """Answers what holds a slider at a pose. Raises ConfigError for effects that make no sense for this slider."""
+
+    def __init__(self, model: SliderModel, pressure: Pressure, effects: FloorEffects) -> None:
+        if not 0 <= effects.shift_m < _room(model.shape, model.cof_m):
+            raise ConfigError(
+                f"a slider whose pressure moves {effects.shift_m:.3g} m ahead tips over", where="slider",
+                do="Push lower, or lower the floor's friction",
+            )  # fmt: skip
+        if not 0 < effects.along_over_across < inf:
+            raise ConfigError(f"{effects.along_over_across} is no ratio of frictions", where="floor")
+        if not (0 <= effects.patch_strength < 1 and 0 < effects.patch_m < inf):
+            raise ConfigError("floor patches need a strength from 0 to below 1 and a size", where="floor")
+        self._model = model
+        self._effects = effects
+        self._moment = _pressure_moment(model.shape, pressure) if effects.turning == "along-push" else None
+        self.follows_push = effects.shift_m > 0 or self._moment is not None
+        self._patches: Callable[[float, float, float, float], tuple[float, float, float, float]] | None = None
+        if effects.patch_strength > 0:
+            points = model.shape.rim_points() if pressure == "rim" else model.shape.grid_points(SUPPORT_ACROSS)
+            self._patches = _Patches(
+                model, points, FrictionField(effects.patch_strength, effects.patch_m, effects.seed)
+            )
+
+    def grip(self, x: float, y: float, cos_: float, sin_: float, push_x: float, push_y: float) -> Grip:
+        """Return what holds the slider at a pose (m; cosine and sine of its heading), pushed along a BODY direction."""
+        model, effects = self._model, self._effects
+        cof_x, cof_y = model.cof_m
+        d, f_max = model.d_m, model.f_max_N
+        if self._moment is not None:
+            xx, xy, yy = self._moment
+            d = sqrt(xx * push_x * push_x + 2.0 * xy * push_x * push_y + yy * push_y * push_y)
+        if self._patches is not None:
+            shift_x, shift_y, load, spread = self._patches(x, y, cos_, sin_)
+            cof_x, cof_y, f_max, d = cof_x + shift_x, cof_y + shift_y, f_max * load, d * spread
+        cof_x += effects.shift_m * push_x
+        cof_y += effects.shift_m * push_y
+        return (cof_x, cof_y, d, f_max, self._grain(cos_, sin_))
+
+    def _grain(self, cos_: float, sin_: float) -> Grain | None:
+        """Return the floor's grain in BODY axes: 1 along its direction, the squared ratio across."""
+        ratio = self._effects.along_over_across
+        if ratio == 1.0:
+            return None
+        c0, s0 = cos(self._effects.grain_rad), sin(self._effects.grain_rad)
+        c, s = c0 * cos_ + s0 * sin_, s0 * cos_ - c0 * sin_  # the direction, BODY
+        across = ratio * ratio
+        return (c * c + across * s * s, (1.0 - across) * c * s, s * s + across * c * c)
+
+
+class _Patches:
+    """The slider's pressure at some points on a floor of patches: how its centre, load and spread change."""
+
+    def __init__(self, model: SliderModel, points: tuple[Point, ...], field: FrictionField) -> None:
+        cof_x, cof_y = model.cof_m
+        self._points = tuple((px - cof_x, py - cof_y) for px, py in points)
+        self._cof = model.cof_m
+        self._reach = model.shape.bounding_radius_m
+        self._spread = sum(hypot(*p) for p in self._points)
+        self._field = field
+        self._seen: tuple[float, float, float, float] | None = None
+        self._answer = (0.0, 0.0, 1.0, 1.0)
+
+    def __call__(self, x: float, y: float, cos_: float, sin_: float) -> tuple[float, float, float, float]:
+        """Return shift of the centre of friction x, y (m, BODY), load and spread relative to an even floor."""
+        if self._seen is not None:
+            old_x, old_y, old_cos, old_sin = self._seen
+            turned = abs(cos_ - old_cos) + abs(sin_ - old_sin)
+            if abs(x - old_x) + abs(y - old_y) + turned * self._reach < LOOK_AGAIN_M:
+                return self._answer
+        self._seen = (x, y, cos_, sin_)
+        at = self._field.at
+        cof_x, cof_y = self._cof
+        weights = [
+            at(x + cos_ * (cof_x + px) - sin_ * (cof_y + py), y + sin_ * (cof_x + px) + cos_ * (cof_y + py))
+            for px, py in self._points
+        ]
+        total = sum(weights)
+        shift_x = sum(w * p[0] for w, p in zip(weights, self._points, strict=True)) / total
+        shift_y = sum(w * p[1] for w, p in zip(weights, self._points, strict=True)) / total
+        spread = sum(w * hypot(p[0] - shift_x, p[1] - shift_y) for w, p in zip(weights, self._points, strict=True))
+        count = len(self._points)
+        self._answer = (shift_x, shift_y, total / count, spread / total * count / self._spread)
+        return self._answer
+
+
+def _pressure_moment(shape: Shape, pressure: Pressure) -> Moment:
+    """Return the mean of x^2, xy, y^2 of a pressure distribution about the shape's centroid (m^2)."""
+    if pressure == "rim":
+        x, y = shape.centroid_m
+        points = [(px - x, py - y) for px, py in shape.rim_points()]
+        n = len(points)
+        return (
+            sum(p[0] ** 2 for p in points) / n,
+            sum(p[0] * p[1] for p in points) / n,
+            sum(p[1] ** 2 for p in points) / n,
+        )
+    xx, xy, yy = shape.second_moment_m2()
+    scale = 1.0 if pressure == "uniform" else POINT_SHARE_OF_UNIFORM**2
+    return (xx * scale, xy * scale, yy * scale)
+
+
+def _room(shape: Shape, cof: Point) -> float:
+    """Return how far the centre of friction can move in any direction before it leaves the shape (m)."""
+    if isinstance(shape, Circle):
+        return shape.radius_m - hypot(*cof)
+    return min(f.normal_x * cof[0] + f.normal_y * cof[1] - f.offset for f in shape.faces)

@@ -1,0 +1,1 @@
+"""The Ridgeback emulated behind a rosbridge websocket server."""

@@ -1,0 +1,124 @@
+"""What can go wrong with a base behind a bridge, on request: times in s, from now on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+
+from robot_io.clock import NS_PER_S, monotonic_ns
+from robot_io.ipc.event_loop import EventLoop, Timer
+from robot_io.messages import BodyTwist, Pose2D
+from sim_backend.ridgeback.emulator import RosbridgeEmulator
+from sim_backend.ridgeback.websocket_server import WebSocketPeer
+
+_JOYSTICK_PERIOD_NS = NS_PER_S // 20
+_BURST_OUT_NS = 1_000_000
+"""After a freeze the backlog of the clients is read first, then theirs goes out."""
+
+
+class BridgeFaults:
+    """Faults of one emulated bridge; those with a duration end by themselves."""
+
+    def __init__(self, loop: EventLoop, emulator: RosbridgeEmulator) -> None:
+        self._loop = loop
+        self._emulator = emulator
+        self._timers: list[Timer] = []
+
+    def freeze(self, seconds: float) -> None:
+        """Stop the bridge's process; afterwards it works off its backlog, in and out, in one burst."""
+        self._emulator.server.set_running(False)
+        self._after(seconds, self._thaw)
+
+    def kill(self) -> None:
+        """Kill the bridge's process: connections are reset, nothing listens."""
+        self._emulator.server.kill()
+
+    def restart(self, after_s: float) -> None:
+        """Kill it, and start it again on the same port; clients must connect and subscribe anew."""
+        self.kill()
+        self._after(after_s, self._emulator.server.listen)
+
+    def half_open(self) -> None:
+        """Swallow every packet of the present clients, both ways; nobody is told."""
+        for peer in list(self._emulator.server.peers):
+            peer.silent = True
+            peer.watch(False)
+
+    def stop_reading(self, seconds: float) -> None:
+        """Read nothing from the present clients, but go on sending to them."""
+        peers = list(self._emulator.server.peers)
+        self._set_reading(peers, False)
+        self._after(seconds, lambda: self._set_reading(peers, True))
+
+    def lag(self, seconds: float) -> None:
+        """Delay everything to the clients by so much (0 ends it); stamps grow old on the way."""
+        self._emulator.lag_ns = round(seconds * NS_PER_S)
+
+    def hold(self, seconds: float) -> None:
+        """Let messages to the clients out only at multiples of this, as Nagle's algorithm may (0 ends it)."""
+        self._emulator.hold_ns = round(seconds * NS_PER_S)
+
+    def occlude_base(self, seconds: float) -> None:
+        """Hide the base from motion capture."""
+        self._emulator.mocap.base_hidden_until_ns = monotonic_ns() + round(seconds * NS_PER_S)
+
+    def occlude_slider(self, seconds: float) -> None:
+        """Hide the pushed object from motion capture."""
+        self._emulator.mocap.slider_hidden_until_ns = monotonic_ns() + round(seconds * NS_PER_S)
+
+    def jump_pose(self, offset: Pose2D, seconds: float) -> None:
+        """Let motion capture see the base elsewhere (m, m, rad), as when markers are mislabelled."""
+        self._emulator.mocap.offset = offset
+        self._after(seconds, lambda: setattr(self._emulator.mocap, "offset", Pose2D()))
+
+    def subscriber_missing(self, missing: bool = True) -> None:
+        """Let nobody listen to the commands."""
+        self._emulator.nodes.set_listening(not missing)
+
+    def press_stop(self) -> None:
+        """Press a hardware stop: motors off, wheels held, status at once."""
+        self._status(stop_engaged=True, drivers_active=False)
+
+    def release_stop(self) -> None:
+        """Release it and press reset: motors on."""
+        self._status(stop_engaged=False, drivers_active=True)
+
+    def battery(self, volt: float) -> None:
+        """Set the battery's voltage; seen with the next status (1 Hz)."""
+        self._status(battery_v=volt)
+
+    def joystick(self, twist: BodyTwist, seconds: float) -> None:
+        """Drive by joystick at 20 Hz; it outranks everybody else, and half a second longer."""
+        until_ns = monotonic_ns() + round(seconds * NS_PER_S)
+
+        def press(now_ns: int) -> None:
+            if now_ns > until_ns:
+                timer.cancel()
+            else:
+                self._emulator.nodes.joystick(twist)
+
+        timer = self._loop.call_every(_JOYSTICK_PERIOD_NS, press, monotonic_ns())
+        self._timers.append(timer)
+
+    def close(self) -> None:
+        """End what is still to come."""
+        for timer in self._timers:
+            timer.cancel()
+
+    def _after(self, seconds: float, action: Callable[[], None]) -> None:
+        deadline_ns = monotonic_ns() + round(seconds * NS_PER_S)
+        self._timers.append(self._loop.call_at(deadline_ns, lambda _: action()))
+
+    def _thaw(self) -> None:
+        self._emulator.server.set_running(True)
+        self._loop.call_at(monotonic_ns() + _BURST_OUT_NS, self._emulator.release)
+
+    def _set_reading(self, peers: list[WebSocketPeer], reading: bool) -> None:
+        for peer in peers:
+            peer.reading = reading
+            peer.watch(self._emulator.server.running)
+
+    def _status(self, **changes: bool | float) -> None:
+        nodes = self._emulator.nodes
+        nodes.set_status(msgspec.structs.replace(nodes.status, **changes))

@@ -1,0 +1,69 @@
+"""How an emulated or simulated Ridgeback behaves: topics, rates, phases, errors."""
+
+from __future__ import annotations
+
+import msgspec
+
+from robot_io.rig.config import RigConfig
+from robot_io.rig.topics import TopicsConfig
+
+DEFAULT_SLIDER_TOPIC = "/vicon/ThingBox/ThingBox"
+
+
+class RidgebackSettings(msgspec.Struct, frozen=True):
+    """Rates in Hz, times in s, volt; phases in [0, 1) of a period; `base_rate_error` relative (0.0001: 0.01 %)."""
+
+    topics: TopicsConfig = TopicsConfig()
+    mocap_rate_hz: float = 100.007
+    mocap_phase: float = 0.29
+    mocap_latency_s: float = 0.004
+    """A pose is published this long after it was."""
+    mocap_jitter_s: float = 0.0
+    """Poses come up to this much later still, at random; less than a period, or they change places."""
+    base_phase: float = 0.53
+    base_rate_error: float = 0.0001
+    base_from_marker: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """x (m), y (m), yaw (rad) of the marker frame in the BODY frame."""
+    battery_v: float = 26.2
+
+    @property
+    def slider_topic(self) -> str:
+        """Topic of the object's pose; motion capture sees it whether or not the rig logs it."""
+        return self.topics.slider_pose or DEFAULT_SLIDER_TOPIC
+
+    def resolved(self) -> RidgebackSettings:
+        """Return the same with every topic as the robot knows it, from the root on."""
+        names = {
+            field: value if value.startswith("/") else f"/{value}"
+            for field, value in msgspec.structs.asdict(self.topics).items()
+            if isinstance(value, str) and value and not field.endswith(("_type", "_frame"))
+        }
+        return msgspec.structs.replace(self, topics=msgspec.structs.replace(self.topics, **names))
+
+
+def ridgeback_settings(rig: RigConfig) -> RidgebackSettings:
+    """Return how the rig's emulated or simulated base behaves."""
+    return RidgebackSettings(
+        topics=rig.base.topics,
+        mocap_rate_hz=rig.world.mocap_rate_hz,
+        base_phase=rig.world.base_phase,
+        base_rate_error=rig.world.base_tick_rate_error,
+        base_from_marker=rig.frames.base_from_marker,
+    )
+
+
+class BridgeSettings(msgspec.Struct, frozen=True):
+    """Habits of the emulated bridge process."""
+
+    escape_slashes: bool = True
+    """Write slashes in JSON as `\\/`, as the server does with one of its two JSON libraries."""
+    nagle: bool = False
+    """Leave the kernel's Nagle algorithm on, as the server does with newer versions of autobahn."""
+    rosapi: bool = True
+    """The rosapi node runs."""
+    ping_interval_s: float = 0.0
+    ping_timeout_s: float = 0.0
+    clock_skew_s: float = 0.0
+    """The robot's wall clock is ahead of this machine's by so much."""
+    zero_on_new_connection: bool = False
+    """The base gets one zero whenever somebody new publishes on or subscribes to its command topic."""

@@ -1,0 +1,1 @@
+"""The three devices of level sim: drivers that ask the world directly."""

@@ -1,0 +1,163 @@
+"""The Ridgeback in process, for level `sim`: the driver's contract on a virtual clock, no wire.
+
+Samples appear at their rates and phases, each read from the world at its own time, oldest first; a pose of
+motion capture arrives `mocap_latency_s` after it was. A command arrives at the moment it is given.
+Not modelled: the bridge (its delays, silences and faults), the multiplexer, battery and stop changes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Literal
+
+from robot_io.clock import NS_PER_S, ClockNs
+from robot_io.driver import DriverBase
+from robot_io.errors import DeviceNotReady
+from robot_io.messages import (
+    BaseFeed,
+    BaseOdometry,
+    BasePose,
+    BaseReport,
+    BaseStatus,
+    BodyTwist,
+    CommandEcho,
+    DeviceHealth,
+    DeviceInfo,
+    LinkState,
+    Pose2D,
+    SliderPose,
+    Stamped,
+)
+from sim_backend.ridgeback.feeds import seen_from
+from sim_backend.ridgeback.settings import RidgebackSettings
+from sim_backend.world.plant import BaseSource
+
+FILTERED_RATE_HZ = 50.0
+STATUS_RATE_HZ = 1.0
+_STATUS_PHASE = 0.01
+"""Soon after the start: the emulated driver has waited for its first status when it reports ready."""
+
+
+class _Feed:
+    """A grid of sample times; what is sampled at t arrives `latency_ns` later."""
+
+    def __init__(self, start_ns: int, rate_hz: float, phase: float, latency_ns: int = 0) -> None:
+        self.period_ns = round(NS_PER_S / rate_hz)
+        self.next_ns = start_ns + round(phase * self.period_ns)
+        self.latency_ns = latency_ns
+
+
+class SimRidgeback(DriverBase):
+    """A base made of a `BaseSource`: `clock` is the virtual clock, `settings` give rates, phases and latency."""
+
+    def __init__(
+        self,
+        source: BaseSource,
+        clock: ClockNs,
+        *,
+        settings: RidgebackSettings = RidgebackSettings(),  # noqa: B008 - frozen
+        pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap",
+    ) -> None:
+        self._source = source
+        self._clock = clock
+        self._settings = settings
+        self._pose_source = pose_source
+        self._state = LinkState.CLOSED
+        self._feeds: dict[str, _Feed] = {}
+        self._seq: Counter[str] = Counter()
+        self._coming: list[Stamped[BaseFeed]] = []
+        self._origin = Pose2D()
+        self.newest_inbound_ns = 0
+        self.newest_pong_ns = 0
+        self.sent_ns = 0
+
+    def open(self) -> DeviceInfo:
+        """Nothing to connect to."""
+        self._state = LinkState.OPENING
+        return DeviceInfo("ridgeback", "simulated", "Ridgeback")
+
+    def start(self) -> None:
+        """Let the feeds run from now on. Raises DeviceNotReady when not open."""
+        if self._state is LinkState.CLOSED:
+            raise DeviceNotReady("it is not open", where="ridgeback sim", do="Open it first")
+        now_ns = self._clock()
+        settings = self._settings
+        self._origin = self._source.read_base(now_ns).pose
+        mocap_ns = round(settings.mocap_latency_s * NS_PER_S)
+        speed_up = 1.0 + settings.base_rate_error
+        self._feeds = {
+            "mocap": _Feed(now_ns, settings.mocap_rate_hz, settings.mocap_phase, mocap_ns),
+            "odometry": _Feed(now_ns, FILTERED_RATE_HZ * speed_up, 0.11),
+            "status": _Feed(now_ns, STATUS_RATE_HZ * speed_up, _STATUS_PHASE),
+        }
+        self._seq.clear()
+        self._coming.clear()
+        self._state = LinkState.UP
+
+    def drain(self) -> tuple[Stamped[BaseFeed], ...]:
+        """Return every sample that has arrived by now, oldest first."""
+        now_ns = self._clock()
+        if self._state != LinkState.UP:
+            return ()
+        self.newest_pong_ns = now_ns
+        # The world only goes forward: sample everything in time order, and let it arrive when its latency is over.
+        while self._feeds:
+            kind = min(self._feeds, key=lambda name: self._feeds[name].next_ns)
+            feed = self._feeds[kind]
+            if feed.next_ns > now_ns:
+                break
+            self._coming += self._sample(kind, feed.next_ns, feed.next_ns + feed.latency_ns)
+            feed.next_ns += feed.period_ns
+        self._coming.sort(key=lambda sample: sample.received_ns)
+        arrived = [sample for sample in self._coming if sample.received_ns <= now_ns]
+        del self._coming[: len(arrived)]
+        if arrived:
+            self.newest_inbound_ns = arrived[-1].received_ns
+        return tuple(arrived)
+
+    def command(self, wanted: BodyTwist) -> BodyTwist:
+        """Give the wheels a velocity (BODY frame). Raises ValueError unless finite."""
+        if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):
+            raise ValueError(f"a velocity must be finite, got {wanted}")
+        if self._state != LinkState.UP:
+            return BodyTwist()
+        self.sent_ns = self._clock()
+        self._source.command_base(wanted, self.sent_ns)
+        self._coming.append(self._stamped("echo", CommandEcho(wanted), self.sent_ns, self.sent_ns))
+        return wanted
+
+    def health(self) -> DeviceHealth:
+        """Return the state and the number of samples by kind."""
+        rate_hz = self._settings.mocap_rate_hz if self._pose_source != "odometry" else FILTERED_RATE_HZ
+        return DeviceHealth(self._state, "", dict(self._seq), rate_hz if self._state == LinkState.UP else 0.0)
+
+    def stop(self) -> None:
+        """Command zero."""
+        self.command(BodyTwist())
+
+    def close(self) -> None:
+        """Nothing to release."""
+        self._state = LinkState.CLOSED
+
+    def _sample(self, kind: str, t_ns: int, arrival_ns: int) -> list[Stamped[BaseFeed]]:
+        if kind == "status":
+            status = BaseStatus(stop_engaged=False, drivers_active=True, battery_v=self._settings.battery_v)
+            return [self._stamped("status", BaseReport(status), arrival_ns, t_ns)]
+        truth = self._source.read_base(t_ns)
+        if kind == "odometry":
+            samples = [self._stamped("odometry", BaseOdometry(truth.twist), arrival_ns, t_ns)]
+            if self._pose_source == "odometry":
+                pose = seen_from(self._origin, truth.pose)
+                samples.append(self._stamped("pose", BasePose(pose), arrival_ns, t_ns))
+            return samples
+        slider = SliderPose(self._source.read_slider(t_ns))
+        samples = [self._stamped("slider", slider, arrival_ns, t_ns)] if self._settings.topics.slider_pose else []
+        if self._pose_source != "odometry":
+            samples.insert(0, self._stamped("pose", BasePose(truth.pose), arrival_ns, t_ns))
+        return samples
+
+    def _stamped(self, kind: str, value: BaseFeed, arrival_ns: int, t_ns: int) -> Stamped[BaseFeed]:
+        seq = self._seq[kind]
+        self._seq[kind] = seq + 1
+        return Stamped(value, seq, arrival_ns, t_ns / NS_PER_S)

@@ -1,0 +1,178 @@
+"""The emulated controller (CB3): power, safety, program, registers and joints, one 8 ms cycle at a time.
+
+It knows no socket. Simplified: power steps take a fixed time; a protective stop pauses the running program and
+unlocking leaves it paused; an emergency stop ends the program and takes the power away.
+"""
+
+from __future__ import annotations
+
+import math
+
+from robot_io.clock import NS_PER_MS, NS_PER_S
+from robot_io.messages import Joints
+from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode
+from sim_backend.ur10.motion import ArmMotion
+from sim_backend.ur10.program import CYCLE_S, OtherProgram, Program, program_of
+from sim_backend.ur10.registers import Registers, Watchdog
+from sim_backend.world.plant import ArmSource
+
+PROGRAM_START_NS = 50 * NS_PER_MS
+UNLOCK_AFTER_NS = 5 * NS_PER_S
+START_TIME_S = 1000.0
+"""What the controller's own clock shows when the emulator starts."""
+
+Version = tuple[int, int, int, int]
+
+
+class UrController:
+    """State of one robot; `cycle` advances it, everything else changes it at once."""
+
+    def __init__(self, source: ArmSource, version: Version, now_ns: int, power_step_s: float = 1.0) -> None:
+        self.version = version
+        self.registers = Registers()
+        self.motion = ArmMotion()
+        self.watchdog: Watchdog | None = None
+        self.payload_kg = 0.0
+        self.payload_cog_m = (0.0, 0.0, 0.0)
+        self.tcp_offset: Joints = (0.0,) * 6
+        self.external_wrench: Joints = (0.0,) * 6
+        self.robot_mode = RobotMode.RUNNING
+        self.safety_mode = SafetyMode.NORMAL
+        self.runtime_state = RuntimeState.STOPPED
+        self.teach_button = False
+        self.program: Program | None = None
+        self.time_jump_s = 0.0
+        self.nan_joints: set[int] = set()
+        self.ignore_scripts = False
+        self.counters = {"cycles": 0, "programs_started": 0, "scripts_refused": 0, "watchdog_trips": 0}
+        self._source = source
+        self._power_step_ns = int(power_step_s * NS_PER_S)
+        self._now_ns = now_ns
+        self._stopped_ns = 0
+        self._waiting: tuple[int, Program] | None = None
+        self._power_at: tuple[int, RobotMode] | None = None
+        self.motion.step(source.read_arm(now_ns), CYCLE_S)
+
+    @property
+    def time_s(self) -> float:
+        """The controller's own clock, s: one cycle is always 8 ms to it."""
+        return START_TIME_S + self.counters["cycles"] * CYCLE_S + self.time_jump_s
+
+    @property
+    def reported_q(self) -> Joints:
+        """Joints as reported (rad), with what the fault injector broke."""
+        if not self.nan_joints:
+            return self.motion.actual
+        a, b, c, d, e, f = (math.nan if i in self.nan_joints else q for i, q in enumerate(self.motion.actual))
+        return (a, b, c, d, e, f)
+
+    def cycle(self, now_ns: int) -> None:
+        """Run one control cycle at `now_ns` (a grid time, monotonic)."""
+        self._now_ns = now_ns
+        self.counters["cycles"] += 1
+        if self._power_at is not None and now_ns >= self._power_at[0]:
+            self.robot_mode = self._power_at[1]
+            self._power_at = None
+        if self._waiting is not None and now_ns >= self._waiting[0]:
+            self._begin_program(self._waiting[1])
+        if self.watchdog is not None and self.watchdog.tripped(now_ns):
+            self.counters["watchdog_trips"] += 1
+            self.stop_program()
+        playing = self.runtime_state == RuntimeState.PLAYING
+        if playing and self.program is not None and not self.program.step(self, now_ns):
+            self.stop_program()
+        self.motion.step(self._source.read_arm(now_ns), CYCLE_S)
+
+    def upload(self, text: str) -> None:
+        """Take a program from a script port; it replaces a running one. Refused without a word when not ready."""
+        if self.ignore_scripts or not self.ready:
+            self.counters["scripts_refused"] += 1
+            return
+        self.start_program(program_of(text))
+
+    @property
+    def ready(self) -> bool:
+        """Whether programs may run."""
+        return self.robot_mode == RobotMode.RUNNING and self.safety_mode in MAY_MOVE
+
+    def start_program(self, program: Program) -> None:
+        """Stop what runs and start `program` a moment later."""
+        self.stop_program()
+        self._waiting = (self._now_ns + PROGRAM_START_NS, program)
+
+    def _begin_program(self, program: Program) -> None:
+        self._waiting = None
+        if not self.ready:  # it was when the program came
+            self.counters["scripts_refused"] += 1
+            return
+        self.program = program
+        self.runtime_state = RuntimeState.PLAYING
+        self.counters["programs_started"] += 1
+
+    def play_other_program(self, name: str = "other") -> None:
+        """Run a program that is not ours, as from the pendant."""
+        self.start_program(OtherProgram(name))
+
+    def stop_program(self) -> None:
+        """End the running program; the arm stays where it is."""
+        self.program = None
+        self._waiting = None
+        self.watchdog = None
+        self.runtime_state = RuntimeState.STOPPED
+        self.motion.hold()
+
+    def pause_program(self) -> None:
+        """Pause the running program; the arm stays where it is."""
+        if self.runtime_state == RuntimeState.PLAYING:
+            self.runtime_state = RuntimeState.PAUSED
+            self.motion.hold()
+
+    def resume_program(self) -> None:
+        """Go on with a paused program."""
+        if self.runtime_state == RuntimeState.PAUSED and self.ready:
+            self.runtime_state = RuntimeState.PLAYING
+
+    def power_on(self) -> None:
+        """Power to the arm; brakes stay on (IDLE) a moment later."""
+        if self.robot_mode == RobotMode.POWER_OFF and self.safety_mode in MAY_MOVE:
+            self.robot_mode = RobotMode.BOOTING
+            self._power_at = (self._now_ns + self._power_step_ns, RobotMode.IDLE)
+
+    def release_brakes(self) -> None:
+        """From IDLE to RUNNING a moment later."""
+        if self.robot_mode == RobotMode.IDLE:
+            self._power_at = (self._now_ns + self._power_step_ns, RobotMode.RUNNING)
+
+    def power_off(self) -> None:
+        """Brakes on and power away, at once."""
+        self.stop_program()
+        self._power_at = None
+        self.robot_mode = RobotMode.POWER_OFF
+
+    def trip_protective_stop(self) -> None:
+        """Stop as for a collision; the program is paused."""
+        self.pause_program()
+        self.safety_mode = SafetyMode.PROTECTIVE_STOP
+        self._stopped_ns = self._now_ns
+
+    def trip_safeguard_stop(self) -> None:
+        """Stop as by an opened fence; the program is paused."""
+        self.pause_program()
+        self.safety_mode = SafetyMode.SAFEGUARD_STOP
+
+    def trip_emergency_stop(self) -> None:
+        """The red button: power away, program ended."""
+        self.power_off()
+        self.safety_mode = SafetyMode.ROBOT_EMERGENCY_STOP
+
+    def unlock_protective_stop(self) -> bool:
+        """Unlock; False within 5 s of the stop. The program stays paused."""
+        if self.safety_mode == SafetyMode.PROTECTIVE_STOP:
+            if self._now_ns - self._stopped_ns < UNLOCK_AFTER_NS:
+                return False
+            self.safety_mode = SafetyMode.NORMAL
+        return True
+
+    def clear_stop(self) -> None:
+        """Back to normal safety mode whatever it was; power and program stay as they are."""
+        self.safety_mode = SafetyMode.NORMAL

@@ -1,0 +1,99 @@
+"""How the emulated arm moves: the joints of the world, plus what drifted, plus what a program commanded.
+
+Not modelled: joint dynamics, Cartesian motion (moveL, speedL), collisions. A servo target is followed with
+first-order lag, a joint move runs at constant speed along the straight line in joint space.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from robot_io.messages import Joints
+from sim_backend.world.plant import ArmTruth
+
+SERVO_LAG_S = 0.03
+STEADY_RAD_PER_S = 0.001
+JOINT_RANGE_RAD = 2.0 * math.pi
+"""Either way, as on the real arm."""
+
+
+class ArmMotion:
+    """Joint angles (rad) after each controller cycle; `offset` is where the arm has gone from the world's joints."""
+
+    def __init__(self) -> None:
+        self.offset = [0.0] * 6
+        self.drift_rate = [0.0] * 6
+        """Creep of each joint (rad/s), for fault injection."""
+        self.actual: Joints = (0.0,) * 6
+        self.velocity: Joints = (0.0,) * 6
+        self.target: Joints = (0.0,) * 6
+        self.moving = False
+        """A joint move is under way."""
+        self._advance: Callable[[Joints, float], Sequence[float]] | None = None
+
+    @property
+    def steady(self) -> bool:
+        """Whether every joint is at rest."""
+        return all(abs(v) < STEADY_RAD_PER_S for v in self.velocity)
+
+    def hold(self) -> None:
+        """Stay where the arm is."""
+        self._advance = None
+        self.moving = False
+
+    def servo(self, target: Joints) -> None:
+        """Follow `target` until told otherwise."""
+        target = _joints([_in_range(q) for q in target])
+
+        def follow(base: Joints, dt_s: float) -> Sequence[float]:
+            share = 1.0 - math.exp(-dt_s / SERVO_LAG_S)
+            return [(target[i] - base[i] - self.offset[i]) * share for i in range(6)]
+
+        self.moving = False
+        self._advance = follow
+
+    def speed(self, rates: Joints) -> None:
+        """Turn each joint at the given rate (rad/s) until told otherwise."""
+        self.moving = False
+        self._advance = lambda _base, dt_s: [rate * dt_s for rate in rates]
+
+    def move(self, target: Joints, speed_rad_per_s: float) -> None:
+        """Go to `target` with the leading joint at `speed_rad_per_s`; `moving` until arrived."""
+        target = _joints([_in_range(q) for q in target])
+
+        def straight(base: Joints, dt_s: float) -> Sequence[float]:
+            left = [target[i] - base[i] - self.offset[i] for i in range(6)]
+            longest = max(abs(x) for x in left)
+            step = max(0.01, speed_rad_per_s) * dt_s  # 0.01 for NaN as well
+            if longest <= step:
+                self.hold()
+                return left
+            return [x * step / longest for x in left]
+
+        self.moving = True
+        self._advance = straight
+
+    def step(self, base: ArmTruth, dt_s: float) -> None:
+        """Go one controller cycle further."""
+        commanded = self._advance(base.position, dt_s) if self._advance is not None else (0.0,) * 6
+        rates = []
+        for i in range(6):
+            change = commanded[i] + self.drift_rate[i] * dt_s
+            wanted = base.position[i] + self.offset[i] + change
+            if (reached := _in_range(wanted)) != wanted:
+                change = reached - base.position[i] - self.offset[i]
+            self.offset[i] += change
+            rates.append(base.velocity[i] + change / dt_s)
+        self.velocity = _joints(rates)
+        self.actual = self.target = _joints([base.position[i] + self.offset[i] for i in range(6)])
+
+
+def _in_range(q: float) -> float:
+    """Return `q` (rad), or the end of the joint's range when it lies beyond; clients command infinity and NaN too."""
+    return q if abs(q) <= JOINT_RANGE_RAD else math.copysign(JOINT_RANGE_RAD, q)
+
+
+def _joints(values: Sequence[float]) -> Joints:
+    a, b, c, d, e, f = values
+    return (a, b, c, d, e, f)

@@ -1,0 +1,147 @@
+"""The simulated world: base, contact ball, pushed object and sensor on one fixed 1 ms grid.
+
+The world catches up to the asked time before it answers; asking never changes what happens. What happens
+depends on start, parameters, seed and the arrival of each command only, and all of that goes to `on_record`,
+so that the world can be run again bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from robot_io.log.world_messages import WorldCommand, WorldStall, WorldStart, WorldState
+from robot_io.messages import BodyTwist, Pose2D
+from robot_io.rig.config import RigConfig
+from sim_backend.physics.contact import FREE, PushedSlider
+from sim_backend.world.base_plant import GRID_NS, BasePlant
+from sim_backend.world.plant import ArmTruth, BaseTruth
+from sim_backend.world.scene import floor_of, place, slider_model
+from sim_backend.world.sensor_model import SensorModel
+
+STATE_EVERY_STEPS = 10
+STALL_STEPS = 30
+"""More than this many steps late: the host paused, and the log says so."""
+
+WorldRecord = WorldStart | WorldCommand | WorldState | WorldStall
+
+
+def _ignore(record: WorldRecord) -> None:
+    """Keep no record."""
+
+
+class World:
+    """Implements FtSource, ArmSource and BaseSource over one slider world.
+
+    rig: its `world`, `frames` and `path` tables are used. start_ns: origin of the grid (CLOCK_MONOTONIC or
+    virtual). on_record: called with each record, in order.
+    """
+
+    def __init__(
+        self, rig: RigConfig, seed: int, start_ns: int, on_record: Callable[[WorldRecord], None] = _ignore
+    ) -> None:
+        scene = place(rig, seed)
+        self._plant = BasePlant(
+            scene.base, start_ns, tick_phase=rig.world.base_phase, rate_error=rig.world.base_tick_rate_error
+        )
+        self._slider = PushedSlider(
+            slider_model(rig.world.slider),
+            (scene.slider.x, scene.slider.y, scene.slider.yaw),
+            rig.world.ball_radius_m,
+            rig.world.solver,
+            floor_of(rig, seed),
+        )
+        self._sensor = SensorModel(rig, seed)
+        self._arm = ArmTruth(rig.arm.held_pose_rad, (0.0,) * 6)
+        self._reach = rig.frames.contact_in_base_m[:2]
+        self._ball = self._ball_of(*self._plant.place)
+        self._contact = FREE
+        self._start_ns = start_ns
+        self._steps = 0
+        self._on_record = on_record
+        self.stalls = 0
+        on_record(WorldStart(seed, start_ns))
+        on_record(self._state())
+
+    @property
+    def now_ns(self) -> int:
+        """Grid time up to which everything has happened."""
+        return self._start_ns + self._steps * GRID_NS
+
+    def advance_to(self, t_ns: int) -> None:
+        """Step to the last grid time that is not after `t_ns`."""
+        due = (t_ns - self._start_ns) // GRID_NS - self._steps
+        if due > STALL_STEPS:
+            self.stalls += 1
+            self._on_record(WorldStall(self.now_ns, due))
+        for _ in range(due):
+            self._step()
+
+    def read_ft(self, t_ns: int) -> tuple[float, float, float, float, float, float]:
+        """See `FtSource.read_ft`."""
+        self.advance_to(t_ns)
+        contact = self._contact
+        pose = self._plant.pose
+        reading = self._sensor.true_reading(
+            (contact.force_x, contact.force_y), _in_base(pose, contact.contact_x, contact.contact_y), pose.yaw
+        )
+        return self._sensor.with_noise(reading)
+
+    def read_arm(self, t_ns: int) -> ArmTruth:
+        """See `ArmSource.read_arm`: the arm is held still."""
+        self.advance_to(t_ns)
+        return self._arm
+
+    def read_base(self, t_ns: int) -> BaseTruth:
+        """See `BaseSource.read_base`."""
+        self.advance_to(t_ns)
+        return BaseTruth(self._plant.pose, self._plant.velocity)
+
+    def read_slider(self, t_ns: int) -> Pose2D:
+        """See `BaseSource.read_slider`."""
+        self.advance_to(t_ns)
+        return self._slider.pose
+
+    def command_base(self, twist: BodyTwist, arrival_ns: int) -> None:
+        """See `BaseSource.command_base`; it acts at the first base tick that is not before its arrival."""
+        counted_ns = self._plant.command(twist, arrival_ns)
+        self._on_record(WorldCommand(counted_ns, twist, False, True))
+
+    def set_drivers(self, active: bool, at_ns: int) -> None:
+        """See `BaseSource.set_drivers`."""
+        counted_ns = self._plant.set_drivers(active, at_ns)
+        self._on_record(WorldCommand(counted_ns, BodyTwist(), True, active))
+
+    def _step(self) -> None:
+        self._steps += 1
+        self._plant.step_to(self.now_ns)
+        ball = self._ball_of(*self._plant.place)
+        self._contact = self._slider.step(self._ball, ball, GRID_NS * 1e-9)
+        self._ball = ball
+        if self._steps % STATE_EVERY_STEPS == 0:
+            self._on_record(self._state())
+
+    def _ball_of(self, x: float, y: float, yaw: float) -> tuple[float, float]:
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        reach_x, reach_y = self._reach
+        return x + cos * reach_x - sin * reach_y, y + sin * reach_x + cos * reach_y
+
+    def _state(self) -> WorldState:
+        contact = self._contact
+        return WorldState(
+            self.now_ns,
+            self._plant.pose,
+            self._plant.velocity,
+            self._slider.pose,
+            contact.force_x,
+            contact.force_y,
+            contact.contact_x,
+            contact.contact_y,
+            int(contact.mode),
+        )
+
+
+def _in_base(pose: Pose2D, x_world: float, y_world: float) -> tuple[float, float]:
+    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+    dx, dy = x_world - pose.x, y_world - pose.y
+    return cos * dx + sin * dy, cos * dy - sin * dx

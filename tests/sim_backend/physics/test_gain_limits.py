@@ -1,0 +1,87 @@
+"""The closed-form gain limits against reference values, their special cases, and the simulated world."""
+
+import math
+
+import pytest
+
+from sim_backend.physics.gain_limits import (
+    PushedBody,
+    fast_loop_k_f,
+    frictionless_limit,
+    limit,
+    offset_per_degree_m,
+    offset_per_newton_m,
+    sticking_limit,
+)
+from tools.study.gain_check import growth_rate, simulated_limit
+
+SQUARE_D = (math.sqrt(2) + math.asinh(1)) / 6
+BOX = PushedBody(round=False, rho_m=0.2, d_m=0.153, ball_radius_m=0.05, shift_m=0.045)
+BARREL = PushedBody(round=True, rho_m=0.25, d_m=0.125, ball_radius_m=0.05, shift_m=0.045)
+
+
+@pytest.mark.parametrize(
+    ("body", "sticking", "frictionless"),
+    [
+        (PushedBody(round=False, rho_m=0.5, d_m=SQUARE_D), 0.1261, 0.1244),
+        (PushedBody(round=False, rho_m=0.5, d_m=math.sqrt(0.5)), 0.0667, 0.0638),
+        (PushedBody(round=True, rho_m=0.5, d_m=1 / 3), 0.1385, 0.2000),
+        (PushedBody(round=True, rho_m=0.5, d_m=0.5), 0.1000, 0.2000),
+    ],
+)
+def test_limits_of_the_papers_sliders(body, sticking, frictionless):
+    assert sticking_limit(body, 0.1) == pytest.approx(sticking, abs=6e-5)
+    assert frictionless_limit(body, 0.1) == pytest.approx(frictionless, abs=6e-5)
+    assert limit([body], 0.1) == pytest.approx(min(sticking, frictionless), abs=6e-5)
+
+
+def test_frictionless_box_limit_solves_its_condition():
+    for body in (BOX, PushedBody(round=False, rho_m=0.3, d_m=0.2, shift_m=0.02, along_over_across=1.08)):
+        a2 = body.along_over_across**2
+        reach, kappa = body.rho_m + body.shift_m + body.ball_radius_m, 0.3 + 1 - a2
+        k_y = frictionless_limit(body, 0.3)
+        assert (reach / body.d_m**2 - k_y) * (kappa - reach * k_y) == pytest.approx(a2 * k_y)
+
+
+def test_a_floor_that_resists_along_the_path_needs_k_f():
+    # k_f 0.1 tolerates 4.9 %, 0.3 tolerates 14 %
+    for k_f, tolerated in ((0.1, 1.0488), (0.3, 1.1402)):
+        for factor, stable in ((0.999, True), (1.001, False)):
+            body = PushedBody(round=False, rho_m=0.2, d_m=0.15, along_over_across=tolerated * factor)
+            assert (sticking_limit(body, k_f) > 0) is stable
+            assert (frictionless_limit(body, k_f) > 0) is stable
+
+
+def test_fast_loop_and_offsets():
+    assert fast_loop_k_f([PushedBody(round=False, rho_m=0.5, d_m=0.5)]) == pytest.approx(1.0)
+    # by hand: 1.3 / 0.1 times an angle of 0.01745, or of 1 / 13.7
+    assert offset_per_degree_m(0.3, 0.1) == pytest.approx(0.2269, abs=1e-4)
+    assert offset_per_newton_m(0.3, 0.1, 13.7) == pytest.approx(0.95, abs=0.01)
+
+
+@pytest.mark.parametrize("body", [BOX, BARREL])
+def test_the_weave_grows_beyond_the_limit_and_not_below(body):
+    k_y = sticking_limit(body, 0.3)
+    assert growth_rate(body, 0.3, 0.97 * k_y, frictionless=False) < 0
+    assert growth_rate(body, 0.3, 1.03 * k_y, frictionless=False) > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("k_f", "ratio"), [(0.1, 1.0), (0.3, 1.0), (0.3, 1.05)])
+@pytest.mark.parametrize("frictionless", [False, True])
+@pytest.mark.parametrize("body", [BOX, BARREL, PushedBody(round=False, rho_m=0.5, d_m=SQUARE_D)])
+def test_simulation_finds_the_same_limit(body, frictionless, k_f, ratio):
+    body = PushedBody(body.round, body.rho_m, body.d_m, body.ball_radius_m, body.shift_m, ratio)
+    expected = (frictionless_limit if frictionless else sticking_limit)(body, k_f)
+    assert simulated_limit(body, k_f, frictionless=frictionless, near=expected) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("body", [
+    PushedBody(round=False, rho_m=0.1, d_m=0.006, ball_radius_m=0.05, shift_m=0.045, along_over_across=0.8),
+    PushedBody(round=True, rho_m=0.1, d_m=0.0067, ball_radius_m=0.01, shift_m=0.045, along_over_across=1.03),
+    PushedBody(round=True, rho_m=0.03, d_m=0.02),
+])  # fmt: skip
+def test_simulation_finds_the_limit_of_small_sliders_too(body):
+    expected = frictionless_limit(body, 0.6)
+    assert simulated_limit(body, 0.6, frictionless=True, near=expected) == pytest.approx(expected, rel=0.01)

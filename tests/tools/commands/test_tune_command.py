@@ -1,0 +1,140 @@
+"""`push tune`: region, recommendation, costs, map, refusals; and what `push run` warns about."""
+
+import json
+
+import pytest
+
+from robot_io.errors import ConfigError
+from robot_io.rig.config import load_rig
+from sim_backend.physics.gain_limits import PushedBody, fast_loop_k_f, limit
+from tools import cli
+from tools.terminal.gain_warning import gain_warning
+
+
+def tune(capsys, *argv):
+    code = cli.main(["tune", *map(str, argv), "--json"])
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    return code, json.loads(out.splitlines()[-1]), err
+
+
+def test_a_recommendation_with_its_margin_costs_and_map(tmp_path, capsys):
+    code, result, err = tune(capsys, "--out", tmp_path / "out", "--no-check")
+    assert code == 0
+    k_f, k_y = result["recommended"]["k_f"], result["recommended"]["k_y_rad_per_m"]
+    assert k_f == 0.28  # half of where the force angle of the rim-loaded box runs away
+    assert 0.45 < result["share_of_limit"] <= 0.5
+    assert result["margin"] == pytest.approx(result["limit_k_y_rad_per_m"] / k_y)
+    assert result["offset_m_per_degree"] == pytest.approx((1 + k_f) / k_y * 0.0174533, rel=1e-5)
+    assert result["offset_m_per_newton"] == pytest.approx((1 + k_f) / k_y / 15)
+    assert "recommended" in err
+    assert result["checks_passed"] is None
+    for name in result["files"]:
+        assert (tmp_path / "out" / name).stat().st_size > 5000
+    shares = {preset["name"]: preset["share_of_limit"] for preset in result["presets"]}
+    assert shares["paper, hardware"] > 1 > shares["paper, simulation"]
+
+
+def test_one_slider_gives_its_own_limit(tmp_path, capsys):
+    _, result, _ = tune(
+        capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "circle", "--size-m", "0.5,0.5",
+        "--pressures", "rim", "--turning", "along-push", "--floor-friction", "0.3", "--anisotropy", "1.05",
+    )  # fmt: skip
+    body = PushedBody(True, 0.25, 0.25 / 2**0.5, 0.05, 0.045, 1.05)
+    assert result["assumed"] == 1
+    assert result["limit_k_y_rad_per_m"] == pytest.approx(limit([body], 0.3))
+    at = {entry["k_f"]: entry["k_y_rad_per_m"] for entry in result["limits"]}
+    assert at[0.1] <= 0 < at[0.12]  # this floor needs k_f above 0.1025
+    assert at[0.6] == pytest.approx(limit([body], 0.6))
+
+
+def test_k_f_stays_clear_of_the_fast_loop(tmp_path, capsys):
+    _, result, err = tune(
+        capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "box", "--size-m", "0.3,0.3",
+        "--width-m", "0.7,0.7", "--pressures", "rim",
+    )  # fmt: skip
+    assert result["recommended"]["k_f"] < 0.3
+    assert "k_f 0.3 is not taken" in err
+    assert result["recommended"]["k_f"] <= 0.5 * result["fast_loop_k_f"]
+    body = PushedBody(False, 0.15, (0.15**2 + 0.35**2) ** 0.5, 0.05, 0.045)
+    assert result["fast_loop_k_f"] == pytest.approx(fast_loop_k_f([body]))
+    assert limit([body], 1.01 * result["fast_loop_k_f"]) == 0
+
+
+@pytest.mark.long
+def test_simulation_agrees_to_a_percent(tmp_path, capsys):
+    _, result, err = tune(capsys, "--out", tmp_path / "out", "--anisotropy", "1.03")
+    assert result["checks_passed"] is True
+    assert len(result["checks"]) == 4
+    assert "simulated" in err
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["--size-m=0.3"],
+        ["--size-m=0.7,0.3"],
+        ["--size-m=nan,1"],
+        ["--shapes=star"],
+        ["--pressures="],
+        ["--ball-radius-m=-1"],
+        ["--anisotropy=0"],
+        ["--slide-force-N=inf"],
+        ["--k-f=nan"],
+        ["--k-f=0"],
+        ["--anisotropy=2"],
+        ["--push-height-m=10"],
+    ],
+)
+def test_bad_input_is_one_sentence(tmp_path, capsys, argv):
+    code, answer, err = tune(capsys, *argv, "--no-check", "--out", tmp_path / "out")
+    assert code == 2
+    assert answer["error"]["code"] == 2
+    assert len(err.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_full_folder_is_left_alone(tmp_path, capsys):
+    (tmp_path / "mine").write_text("precious")
+    code, _, err = tune(capsys, "--no-check", "--out", tmp_path)
+    assert code == 2
+    assert "not empty" in err
+    assert [p.name for p in tmp_path.iterdir()] == ["mine"]
+
+
+def test_run_warns_of_gains_with_little_margin_only():
+    assert gain_warning(load_rig("sim")) is None
+    paper = gain_warning(load_rig("sim", ["control.k_f=0.1", "control.k_y_rad_per_m=0.3"]))
+    assert paper is not None
+    assert "0.1/0.3" in paper
+    assert "\n" not in paper
+    assert gain_warning(load_rig("sim", ["control.controller=open-loop", "control.k_y_rad_per_m=2"])) is None
+    assert gain_warning(load_rig("sim", ["world.slider.shape=circle", "control.k_y_rad_per_m=1.5"])) is not None
+    assert all(gain_warning(load_rig(name)) is None for name in ("emulated", "barrel", "thing"))
+    assert gain_warning(load_rig("paper-gains")) is not None
+
+
+def test_run_warns_for_the_whole_range_of_sliders_that_the_rig_assumes():
+    """Sticking box of length L, ball R, uniform: k_y < k_f (L/2 - R) / (d^2 + L^2/4), d = 0.3826 L."""
+    limit_1m = 0.3 * (0.5 - 0.05) / (0.382598**2 + 0.25)
+    for share, warned in ((0.68, False), (0.72, True)):
+        settings = [f"control.k_y_rad_per_m={share * limit_1m}", "sliders.longest_m=1.0"]
+        for rig in ("sim", "thing"):
+            assert (gain_warning(load_rig(rig, settings)) is not None) == warned
+            assert gain_warning(load_rig(rig, settings[:1])) is None
+    simulated = gain_warning(load_rig("sim", ["world.slider.length_m=3", "world.slider.width_m=3"]))
+    real = gain_warning(load_rig("thing", ["world.slider.length_m=3", "world.slider.width_m=3"]))
+    assert simulated is not None  # no box of the range, but the one that is there
+    assert real is None
+
+
+def test_a_range_of_sliders_upside_down_is_refused(capsys):
+    assert cli.main(["run", "sim", "--fast", "--set", "sliders.shortest_m=0.6"]) == 2
+    assert "sliders.shortest_m must not be above sliders.longest_m" in capsys.readouterr().err
+
+
+def test_sliders_that_would_all_tip_over_are_no_reason_to_fail():
+    """Pushed at 2 m nothing of the range stays upright: then there is nothing to warn of."""
+    assert gain_warning(load_rig("thing", ["world.floor.push_height_m=2"])) is None
+    with pytest.raises(ConfigError, match="tips over"):
+        gain_warning(load_rig("sim", ["world.floor.push_height_m=2"]))

@@ -1,0 +1,203 @@
+"""Level sim: the same bytes wherever and whenever it runs, light to start, stopped as any run, paced on demand."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from robot_io.clock import SIM_EPOCH_NS
+from robot_io.log.channels import CHANNELS, Kind
+from robot_io.log.mcap_read import read_log, read_summary
+from robot_io.log.world_messages import STATE_CDR
+from robot_io.messages import BodyTwist
+from robot_io.tick import TICK_CDR
+from tests.replay.runs import PUSH, ROOT, push
+from tools.rig import resolve_rig
+from tools.run.lockstep import Lockstep, WallPace
+from tools.run.tick_core import TickCore
+
+SHORT = ("run", "sim", "--fast", "--distance-m", "0.1", "--no-report")
+
+
+def log_of(out: Path, *words: str, state: Path, cwd: Path = ROOT, **env: str) -> bytes:
+    done = push(*SHORT, *words, "--out", out, state=state, cwd=cwd, **env)
+    assert done.returncode == 0, done.stderr
+    return (cwd / out / "run.mcap").read_bytes()
+
+
+def test_the_same_seed_gives_the_same_bytes_everywhere(tmp_path):
+    first = log_of(tmp_path / "a", "--seed", "3", state=tmp_path / "s1", PYTHONHASHSEED="1", TZ="UTC")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    more = {"PYTHONHASHSEED": "77", "TZ": "Asia/Tokyo", "LC_ALL": "C", "HOME": str(elsewhere), "USER": "nobody"}
+    time.sleep(1.0 - time.time() % 1.0)  # another second of the day
+    second = log_of(Path("other name"), "--seed", "3", "--json", state=tmp_path / "s2", cwd=elsewhere, **more)
+    assert first == second
+    assert log_of(tmp_path / "c", "--seed", "4", state=tmp_path / "s1") != first
+
+
+def test_nothing_of_the_place_the_time_or_the_user_is_in_the_log(tmp_path):
+    out = tmp_path / "telltale-folder"
+    log_of(out, state=tmp_path / "state", USER="telltale-user")
+    summary = read_summary(out / "run.mcap")
+    assert summary.start_ns == SIM_EPOCH_NS
+    host = os.uname().nodename.encode()
+    words = [b"telltale", str(tmp_path).encode(), str(ROOT).encode()]
+    for text in (json.dumps(summary.metadata).encode(), *summary.attachments.values()):
+        assert not [word for word in (*words, host) if word in text]
+    # A short host name is found in any heap of numbers: in messages it counts as a string of CDR only.
+    words.append(struct.pack("<I", len(host) + 1) + host + b"\0")
+    for message in read_log(out / "run.mcap"):
+        assert not [word for word in words if word in message.payload]
+
+
+HEAVY = (
+    "matplotlib", "scipy", "numpy", "osqp", "websockets", "wsproto", "rtde_receive", "rtde_control", "serial",
+    "minimalmodbus", "joblib", "numba", "distributed", "asyncio", "multiprocessing", "lz4",
+)  # fmt: skip
+
+
+def test_level_sim_imports_no_figures_solvers_or_wires(tmp_path):
+    program = (
+        "import sys; from tools.cli import main; code = main(sys.argv[1:]);"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr); sys.exit(code)"
+    )
+    words = [sys.executable, "-c", program, *SHORT, "--out", str(tmp_path / "run")]
+    environment = os.environ | {"XDG_STATE_HOME": str(tmp_path)}
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines()[-1] == "[]"
+
+
+def test_the_operators_stop_ends_a_paced_run_with_130_and_a_whole_log(tmp_path):
+    out = tmp_path / "run"
+    words = [sys.executable, "-c", PUSH, "run", "sim", "--out", str(out), "--no-report", "--json"]
+    environment = os.environ | {"XDG_STATE_HOME": str(tmp_path), "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(
+        words, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        for line in process.stderr:  # until the base moves
+            if "APPROACH" in line:
+                break
+        process.send_signal(signal.SIGINT)
+        told, _ = process.communicate(timeout=30)
+    summary = json.loads(told.splitlines()[-1])
+    assert process.returncode == summary["exit_code"] == 130
+    assert summary["verdict"] == "operator stop"
+    done = push("replay", out, "--json", state=tmp_path)
+    assert done.returncode == 0, done.stderr
+    ticks = [TICK_CDR.decode(m.payload) for m in read_log(out / "run.mcap") if m.topic == "/control/tick"]
+    assert max(abs(tick.output.command_body.vx) for tick in ticks) > 0.0
+    assert ticks[-1].output.command_body.vx == ticks[-1].output.command_body.vy == 0.0
+    assert ticks[-1].output.finished
+
+
+def test_an_exception_in_a_tick_stops_the_base_and_is_named_in_the_log(monkeypatch):
+    """As in the loop of a wall-clock run: zero, F68, and the error goes on to whoever runs it."""
+    fold = TickCore.fold
+
+    def broken(self, state, inp):
+        if state.control.progress_m > 0.01 and not inp.host.loop_error:
+            raise ArithmeticError("planted by a test")
+        return fold(self, state, inp)
+
+    monkeypatch.setattr(TickCore, "fold", broken)
+    ticks, sent = [], []
+
+    class Kept:
+        def record(self, kind, time_ns, payload):
+            if kind == Kind.GATE_SENT:
+                sent.append(CHANNELS[Kind.GATE_SENT].cdr_type.decode(payload).twist.linear)
+
+        def tick(self, time_ns, payload, tick):
+            ticks.append(tick)
+
+    one = Lockstep(resolve_rig("sim", ()), 0, Kept())
+    with pytest.raises(ArithmeticError, match="planted by a test"):
+        one.run(lambda *_: None)
+    *_, before, last = ticks
+    assert before.output.command_body != BodyTwist()
+    assert (last.output.faults, last.output.exit_code, last.output.finished) == (("F68",), 1, True)
+    assert last.output.command_body == BodyTwist()
+    assert last.before == before.after
+    assert one.notes.fault_counts == {"F68": 1}
+    assert (sent[-2].x > 0.04, sent[-1].x, sent[-1].y) == (True, 0.0, 0.0)
+
+
+def test_pacing_keeps_the_rate_and_never_bursts_after_a_pause(monkeypatch):
+    now_s = 100.0
+    waits = []
+
+    def sleep(seconds: float) -> None:
+        nonlocal now_s
+        waits.append(seconds)
+        now_s += seconds
+
+    monkeypatch.setattr(time, "monotonic", lambda: now_s)
+    monkeypatch.setattr(time, "sleep", sleep)
+    pace = WallPace(0.01)
+    for _ in range(100):
+        now_s += 0.002  # the tick's own work
+        pace.wait()
+    assert now_s == pytest.approx(101.0)
+    now_s += 0.5
+    waits.clear()
+    for _ in range(10):
+        pace.wait()
+    assert waits[0] == 0.0
+    assert waits[1:] == pytest.approx([0.01] * 9)
+
+
+def test_a_paced_run_takes_as_long_as_it_says(tmp_path):
+    began_s = time.monotonic()
+    done = push("run", "sim", "--distance-m", "0.05", "--out", tmp_path / "run", "--no-report", state=tmp_path)
+    took_s = time.monotonic() - began_s
+    assert done.returncode == 0, done.stderr
+    summary = read_summary(tmp_path / "run" / "run.mcap")
+    duration_s = (summary.end_ns - summary.start_ns) * 1e-9
+    assert duration_s > 5.0
+    assert 0.99 * duration_s < took_s < 10 * duration_s  # a slow host may take longer, never shorter
+
+
+def test_osqp_and_the_closed_form_push_the_same_way(tmp_path):
+    tracks = []
+    for solver in ("exact", "osqp"):
+        out = tmp_path / solver
+        log_of(out, "--set", f'world.solver="{solver}"', state=tmp_path / "state")
+        states = [STATE_CDR.decode(m.payload) for m in read_log(out / "run.mcap") if m.topic == "/world/state"]
+        tracks.append([(s.base.x, s.base.y, s.slider.x, s.slider.y, s.slider.yaw) for s in states])
+    exact, osqp = tracks
+    assert len(exact) == len(osqp)
+    assert exact[0][2] != exact[-1][2]
+    worst = max(abs(a - b) for one, two in zip(exact, osqp, strict=True) for a, b in zip(one, two, strict=True))
+    assert 0.0 < worst < 1e-6  # zero: the same solver twice
+
+
+def test_a_disk_that_fills_up_is_a_sentence_and_what_was_written_can_be_saved(tmp_path):
+    words = [sys.executable, "-c", PUSH, *SHORT, "--out", str(tmp_path / "run"), "--json"]
+    done = subprocess.run(
+        words,
+        cwd=ROOT,
+        env=os.environ | {"XDG_STATE_HOME": str(tmp_path), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000)),
+    )
+    error = json.loads(done.stdout)["error"]
+    assert (done.returncode, error["code"]) == (3, 3)
+    assert error["where"].endswith("run.mcap")
+    assert "unexpected" not in done.stderr
+    assert push("log", "recover", tmp_path / "run", state=tmp_path).returncode == 0
+    assert push("replay", tmp_path / "run" / "run_recovered.mcap", state=tmp_path).returncode == 0

@@ -1,0 +1,92 @@
+"""What is said of processes that did not become ready: one error, one exit code, every device by name."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+
+import pytest
+
+from robot_io.errors import ConfigError, DeviceError, EnvironmentFault, PushError
+from robot_io.ipc.spawn import Child
+from tools.terminal.start_errors import combined, not_in_time
+
+
+@pytest.fixture
+def child():
+    """Make children: a process that ran `code`, and what it is to have said."""
+    made = []
+
+    def make(name, code="", errors=()):
+        stderr = tempfile.TemporaryFile()  # noqa: SIM115 - the Child closes it
+        process = subprocess.Popen([sys.executable, "-c", code], stderr=stderr)
+        process.wait()
+        read_fd, write_fd = os.pipe()
+        os.close(write_fd)
+        found = Child(name, process, read_fd, stderr)
+        found.errors += errors
+        made.append(found)
+        return found
+
+    yield make
+    for found in made:
+        found.close()
+
+
+def said(code, what, where="there", do="Do this"):
+    return {"code": code, "what": what, "where": where, "do": do}
+
+
+def test_one_failure_keeps_its_parts(child):
+    error = combined([child("gate", errors=[said(4, "it is off", "ws://a:1", "Switch it on")])])
+    assert type(error) is DeviceError
+    assert (error.what, error.where, error.do) == ("it is off", "ridgeback ws://a:1", "Switch it on")
+
+
+def test_a_place_that_names_the_device_is_not_named_twice(child):
+    error = combined([child("control", errors=[said(4, "no such port", "ft300 /dev/x")])])
+    assert error.where == "ft300 /dev/x"
+
+
+def test_several_are_named_in_one_order_each_with_what_to_do(child):
+    failed = [child(name, errors=[said(4, f"{name} fails")]) for name in ("gate", "arm", "control")]
+    error = combined(failed)
+    assert error.exit_code == 4
+    assert error.what == "ft300 there: control fails; ur10 there: arm fails; ridgeback there: gate fails"
+    assert error.do == "ft300: Do this; ur10: Do this; ridgeback: Do this"
+
+
+@pytest.mark.parametrize(("codes", "kind"), [([2, 2], ConfigError), ([3], EnvironmentFault), ([2, 4], DeviceError)])
+def test_the_exit_code_is_theirs(child, codes, kind):
+    failed = [child(name, errors=[said(code, "no")]) for name, code in zip(("arm", "gate"), codes, strict=False)]
+    assert type(combined(failed)) is kind
+
+
+def test_the_recorder_says_no_code_and_is_no_device(child):
+    error = combined([child("recorder", errors=[{"event": "error", "what": "the disk is full"}])])
+    assert (error.exit_code, error.what, error.where) == (3, "the disk is full", "recorder")
+
+
+def test_a_crash_is_a_defect_whose_traceback_is_kept(child, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    error = combined([child("arm", "raise ValueError('planted')")])
+    assert type(error) is PushError
+    assert error.exit_code == 1
+    assert error.what == "its process ended with code 1 (ValueError: planted)"
+    [kept] = tmp_path.glob("push-arm-*.txt")
+    assert str(kept) in error.do
+    assert kept.read_text().startswith("Traceback")
+
+
+def test_a_killed_process_names_the_signal(child):
+    error = combined([child("gate", "import os; os.kill(os.getpid(), 9)")])
+    assert (error.what, error.do) == ("its process was killed by SIGKILL", "")
+
+
+def test_one_that_hangs_is_named(child):
+    hanging = child("arm")
+    error = not_in_time([hanging])
+    assert error.exit_code == 4
+    assert f"ur10 (process {hanging.pid})" in error.what

@@ -1,0 +1,172 @@
+"""`push emulate ft300|ur10|ridgeback|all`: the wire emulators alone, for any client, until SIGTERM or Ctrl-C.
+
+Alone, a device is fed by a constant source; `all` puts the three on one simulated world. Everything listens
+on loopback only. One line per endpoint says where, as soon as clients are accepted there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import ipaddress
+import os
+import signal
+from collections.abc import Iterator
+from types import FrameType
+
+from robot_io.clock import monotonic_ns
+from robot_io.error_report import say_json
+from robot_io.errors import UsageError
+from robot_io.ipc.event_loop import EventLoop
+from robot_io.ipc.process import set_timer_slack_1ns
+from sim_backend.ft300.emulator import Ft300Emulator
+from sim_backend.ft300.standalone import ConstantWrench, parse_wrench
+from sim_backend.ridgeback.standalone import standalone_emulator
+from sim_backend.ur10.emulator import UrEmulator
+from sim_backend.ur10.standalone import StillArm
+from sim_backend.world.world import World
+from tools.rig import resolve_rig
+from tools.run.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
+
+ARM_HOST = "127.0.0.10"
+BASE_HOST = "127.0.0.1"
+BASE_PORT = 9090
+"""rosbridge's own default."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the devices and their flags."""
+    devices = parser.add_subparsers(dest="device", required=True, metavar="DEVICE")
+
+    ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty", allow_abbrev=False)
+    wrench = "FX,FY,FZ,MX,MY,MZ"
+    ft.add_argument("--wrench", default="0,0,0,0,0,0", metavar=wrench, help="N, N*m; as in --wrench=-10,0,0,0,0,0")
+    ft.add_argument("--step-after-s", type=float, metavar="S", help="change to --step-wrench this long after the start")
+    ft.add_argument("--step-wrench", metavar=wrench, help="as in --step-wrench=-20,0,0,0,0,0")
+    ft.add_argument("--streaming", action="store_true", help="found streaming, as after a client that crashed")
+    ft.add_argument("--latency-ms", type=int, choices=(0, 1, 16), default=1, help="latency timer of the adapter (1)")
+    ft.set_defaults(open_devices=_open_ft300)
+
+    ur = devices.add_parser(
+        "ur10", help="UR10 controller (RTDE, scripts, dashboard) standing still", allow_abbrev=False
+    )
+    ur.add_argument("--host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST}); one robot per address")
+    ur.set_defaults(open_devices=_open_ur10)
+
+    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server", allow_abbrev=False)
+    base.add_argument("--host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
+    base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 takes a free one ({BASE_PORT})")
+    base.set_defaults(open_devices=_open_ridgeback)
+
+    everything = devices.add_parser("all", help="the three on one simulated world", allow_abbrev=False)
+    everything.add_argument(
+        "rig", nargs="?", default="emulated", help="whose world: a shipped name or a path (emulated)"
+    )
+    everything.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig"
+    )
+    everything.add_argument("--seed", type=int, default=0, help="varies the start and the noise (0)")
+    everything.add_argument("--arm-host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST})")
+    everything.add_argument("--base-host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
+    everything.add_argument("--base-port", type=_port, default=BASE_PORT, help=f"0 takes a free one ({BASE_PORT})")
+    everything.set_defaults(open_devices=_open_all)
+
+    for device in (ft, ur, base, everything):
+        device.add_argument("--json", action="store_true", help="one JSON line per endpoint on stdout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until SIGTERM or SIGINT; return 0. Raises UsageError, ConfigError, EnvironmentFault (address taken)."""
+    set_timer_slack_1ns()
+    loop = EventLoop()
+    with contextlib.closing(loop), contextlib.ExitStack() as opened:
+        opened.enter_context(stopped_by_signals(loop))
+        for emulator in args.open_devices(loop, args, opened):
+            where = endpoint(emulator)
+            if args.json:
+                say_json(where)
+            else:
+                print("  ".join(where.values()), flush=True)
+        loop.run()
+    return 0
+
+
+@contextlib.contextmanager
+def stopped_by_signals(loop: EventLoop) -> Iterator[None]:
+    """Make SIGTERM and SIGINT end `loop.run()`.
+
+    A handler alone would not: Python goes back into the wait after it. The wake-up pipe makes the loop ready.
+    """
+    read_end, write_end = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+    signals = (signal.SIGTERM, signal.SIGINT)
+    before_fd = signal.set_wakeup_fd(write_end)  # first: a signal between the two would be heard by nobody
+    before = [signal.signal(number, _note) for number in signals]
+    loop.add_fd(read_end, lambda _: loop.stop())
+    try:
+        yield
+    finally:
+        loop.remove_fd(read_end)
+        signal.set_wakeup_fd(before_fd)
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)
+        os.close(read_end)
+        os.close(write_end)
+
+
+def _note(_number: int, _frame: FrameType | None) -> None:
+    """Do nothing: the byte in the wake-up pipe does it."""
+
+
+def _open_ft300(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    step_wrench = parse_wrench(args.step_wrench) if args.step_wrench is not None else None
+    source = ConstantWrench(parse_wrench(args.wrench), step_after_s=args.step_after_s, step_wrench=step_wrench)
+    emulator = Ft300Emulator(loop, source, latency_ms=args.latency_ms, streaming=args.streaming)
+    opened.callback(emulator.close)
+    emulator.start()
+    return [emulator]
+
+
+def _open_ur10(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    emulator = UrEmulator(loop, StillArm(), host=args.host)
+    opened.callback(emulator.close)
+    return [emulator]
+
+
+def _open_ridgeback(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    emulator = standalone_emulator(loop, host=args.host, port=args.port)
+    opened.callback(emulator.close)
+    return [emulator]
+
+
+def _open_all(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    rig = resolve_rig(args.rig, args.set)
+    world = World(rig, args.seed, monotonic_ns())
+    emulators: list[Emulator] = []
+    for open_device in (
+        lambda: open_ft300(loop, world, rig),
+        lambda: open_ur10(loop, world, rig, (args.arm_host,)),
+        lambda: open_ridgeback(loop, world, rig, args.base_host, args.base_port),
+    ):
+        emulators.append(open_device())
+        opened.callback(emulators[-1].close)
+    return emulators
+
+
+def _loopback(text: str) -> str:
+    """Return `text` when it is an IPv4 loopback address; UsageError otherwise."""
+    try:
+        loopback = ipaddress.IPv4Address(text).is_loopback
+    except ValueError:
+        loopback = False
+    if not loopback:
+        raise UsageError(
+            f"{text!r} is not a loopback address", where="command line", do="The emulators listen on 127.x.y.z only"
+        )
+    return text
+
+
+def _port(text: str) -> int:
+    """Return a TCP port number; UsageError otherwise."""
+    if not (text.isascii() and text.isdigit() and int(text) <= 65535):
+        raise UsageError(f"{text!r} is not a TCP port", where="command line", do="Give 0..65535")
+    return int(text)

@@ -1,0 +1,145 @@
+"""`push replay LOG`: prove that the program of today does, bit for bit, what the log says it did."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+from robot_io.error_report import printable, say_json, tell
+from robot_io.errors import ReplayDiffers, UsageError
+from robot_io.rig.config import rig_from_toml, rig_to_toml
+from tools.places.find_log import find_log
+from tools.replay.difference import Difference
+from tools.replay.fold import ReplayResult, replay
+from tools.replay.verified_log import VerifiedLog
+from tools.run.run_facts import program_and_machine
+from tools.run.tick_core import TickCore
+
+DIFFERS = ReplayDiffers.exit_code
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `push replay`."""
+    parser.add_argument("log", help="run.mcap, or a run's folder")
+    parser.add_argument(
+        "--what-if", action="append", default=[], metavar="KEY=VALUE", help="other settings over the same inputs"
+    )
+    parser.add_argument("--tolerance", type=float, metavar="X", help="accept numbers this close (another machine)")
+    parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Replay; 0 identical, 7 different. Raises LogDamaged (8) for a log that cannot be trusted."""
+    path = find_log(Path(args.log))
+    if args.tolerance is not None and not args.tolerance >= 0.0:
+        raise UsageError(f"--tolerance {args.tolerance} is not a distance", where="push replay", do="Give 0 or more")
+    if args.what_if:
+        return what_if(path, args)
+    result = replay(path, tolerance=args.tolerance)
+    show = tell if args.json else print
+    show(f"replay: {result.identical} of {result.ticks} ticks identical")
+    if result.world is not None:
+        show(f"world: {result.world.identical} of {result.world.states} states identical")
+    if result.gaps:
+        show(f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)")
+    for note in result.notes:
+        show(f"note: {note}")
+    differences: list[tuple[str, Difference | None]] = [("tick", result.first_difference)]
+    if result.world is not None:
+        differences.append(("world state", result.world.first_difference))
+    for name, found in differences:
+        if found is not None:
+            values = f"logged {found.logged!r}, now {found.replayed!r}"
+            show(f"first difference: {name} {found.tick}, {found.field}: {values}")
+    if result.different:
+        for line in machine_differences(result.facts):
+            show(printable(line))
+    if args.json:
+        say_json(as_json(result))
+    return DIFFERS if result.different else 0
+
+
+def as_json(result: ReplayResult) -> dict[str, Any]:
+    """Return the result as the `--json` object."""
+    world = result.world
+    return {
+        "schema": 1,
+        "ticks": result.ticks,
+        "identical": result.identical,
+        "gaps": result.gaps,
+        "first_difference": _plain(result.first_difference),
+        "world": None
+        if world is None
+        else {
+            "states": world.states,
+            "identical": world.identical,
+            "first_difference": _plain(world.first_difference),
+        },
+        "complete": result.complete,
+        "notes": list(result.notes),
+        "machine_differences": machine_differences(result.facts),
+    }
+
+
+def machine_differences(facts: dict[str, str]) -> list[str]:
+    """Return what differs between program and machine of the log and of today, in words."""
+    now = program_and_machine()
+    return [
+        f"{name} was {facts[name]}, is {value}" for name, value in now.items() if name in facts and facts[name] != value
+    ]
+
+
+def what_if(path: Path, args: argparse.Namespace) -> int:
+    """Fold the log's inputs with other settings and say what the law would have commanded."""
+    log = VerifiedLog(path)
+    log.require_config()
+    other = rig_from_toml(rig_to_toml(log.rig), overrides=args.what_if)
+    core = TickCore.of(other, in_contact=log.in_contact)
+    state = None
+    count = changed = 0
+    worst = 0.0
+    worst_tick = -1
+    for _, _, tick in log.messages():
+        if tick is None:
+            continue
+        state, output = core.fold(tick.before if state is None else state, tick.input)
+        old, new = tick.output.wanted_world, output.wanted_world
+        off = math.hypot(old.vx - new.vx, old.vy - new.vy)
+        count += 1
+        changed += off > 0.0
+        if off > worst:
+            worst, worst_tick = off, tick.input.tick
+    show = tell if args.json else print
+    show(f"what if {', '.join(args.what_if)}: commands the law would have given; the world did not answer")
+    show(f"{changed} of {count} ticks would differ, at most by {worst:.4f} m/s (tick {worst_tick})")
+    if args.json:
+        say_json(
+            {
+                "schema": 1,
+                "what_if": args.what_if,
+                "ticks": count,
+                "changed": changed,
+                "worst_m_per_s": worst,
+                "worst_tick": worst_tick,
+            }
+        )
+    return 0
+
+
+def _plain(found: Difference | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "tick": found.tick,
+        "field": found.field,
+        "logged": _number(found.logged),
+        "replayed": _number(found.replayed),
+    }
+
+
+def _number(value: Any) -> Any:
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value)
+    return value if isinstance(value, str | int | float | bool | list) or value is None else repr(value)

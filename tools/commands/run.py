@@ -1,0 +1,242 @@
+"""`push run [RIG]`: one push, at the level its rig names; emulated by default."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from robot_io.error_report import exit_code_matters_more, say_json, tell
+from robot_io.errors import EnvironmentFault, PushError, UsageError
+from robot_io.rig.config import RigConfig
+from robot_io.tick import TickInput, TickOutput, TickState
+from tools.places import run_dir, saved_tare
+from tools.places.saved_tare import SavedTare
+from tools.places.state_dir import RigLock
+from tools.report.process import ReportProcess
+from tools.rig import devices_at, resolve_rig
+from tools.run.run_facts import level_of
+from tools.run.run_state import status_line
+from tools.terminal import verdict
+from tools.terminal.gain_warning import gain_warning
+from tools.terminal.live_line import LiveLine
+
+LARGEST_SEED = 2**63 - 1
+"""What the log can hold."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `push run`."""
+    parser.add_argument("rig", nargs="?", default="emulated", help="a shipped rig or a TOML file (default: emulated)")
+    parser.add_argument("--distance-m", type=float, help="how far to push, from first contact")
+    parser.add_argument("--controller", choices=("force", "open-loop"), help="force (the law) or straight ahead")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the simulated world (0)")
+    parser.add_argument("--out", help="folder for the run, created (default: runs/RIG-TIME)")
+    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
+    parser.add_argument("--fast", action="store_true", help="level sim only: as fast as it goes")
+    parser.add_argument("--start-in-contact", action="store_true", help="with a tare saved in this power cycle")
+    parser.add_argument("--dry-run", action="store_true", help="show what would run, and connect to nothing")
+    parser.add_argument("--move-robot", action="store_true", help="needed before any real device is opened")
+    parser.add_argument("--no-report", action="store_true", help="write no report.html")
+    parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Push; return the run's exit code. Raises PushError where it could not begin."""
+    rig = resolve_rig(args.rig, overrides(args))
+    check_flags(args, rig)
+    if warning := gain_warning(rig):
+        tell(warning)
+    saved = saved_tare.load(rig) if args.start_in_contact else None
+    if args.dry_run:
+        return dry_run(args, rig)
+    simulated = bool(devices_at(rig, "sim"))
+    if not simulated:
+        announce(rig)
+    with RigLock(rig.name) if not simulated else _NoLock():
+        out = run_dir.create(args.out, rig.name)
+        early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
+        try:
+            summary = lockstep(args, rig, out, saved) if simulated else wall_clock(args, rig, out, saved)
+        except BaseException:
+            if early is not None:
+                early.drop()
+            raise
+    summary["report"] = None
+    write_summary(summary, out)
+    if not args.no_report:
+        report(summary, out, early)
+        write_summary(summary, out)
+    with exit_code_matters_more():
+        for line in verdict.person_lines(summary):
+            tell(line) if args.json else print(line)
+        if args.json:
+            say_json(summary)
+    return int(summary["exit_code"])
+
+
+def overrides(args: argparse.Namespace) -> list[str]:
+    """Return the settings that the flags stand for, after those of `--set`."""
+    found = list(args.overrides)
+    if args.distance_m is not None:
+        found.append(f"control.distance_m={args.distance_m!r}")
+    if args.controller is not None:
+        found.append(f"control.controller={args.controller}")
+    if args.start_in_contact:
+        found.append("world.start.gap_m=0.0")
+    return found
+
+
+def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
+    """Raise UsageError for flags that contradict the rig; nothing was opened yet."""
+    hardware = devices_at(rig, "hardware")
+    if hardware and not args.move_robot and not args.dry_run:
+        raise UsageError(
+            f"rig {rig.name!r} moves a real robot ({', '.join(hardware)} at level hardware)",
+            where="push run",
+            do="Clear the floor, hold the e-stop, and add --move-robot",
+        )
+    if args.fast and not devices_at(rig, "sim"):
+        raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
+    if not 0 <= args.seed <= LARGEST_SEED:
+        raise UsageError(f"--seed {args.seed} is out of range", where="push run", do=f"Give 0 to {LARGEST_SEED}")
+
+
+def announce(rig: RigConfig) -> None:
+    """Say which devices are real, and the limits in force."""
+    for device, level in (("ft", rig.ft.level), ("arm", rig.arm.level), ("base", rig.base.level)):
+        where = {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}[device]
+        tell(f"{device:<5} {level:<9} {where if level == 'hardware' else ''}".rstrip())
+
+
+def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
+    """Show what would run."""
+    facts = {
+        "schema": 1,
+        "dry_run": True,
+        "rig": rig.name,
+        "devices": {
+            "ft300": {"level": rig.ft.level, "port": rig.ft.port},
+            "ur10": {"level": rig.arm.level, "host": rig.arm.host, "hold": rig.arm.hold},
+            "ridgeback": {"level": rig.base.level, "url": rig.base.url},
+        },
+        "distance_m": rig.control.distance_m,
+        "controller": rig.control.controller,
+        "push_speed_m_per_s": rig.control.push_speed_m_per_s,
+    }
+    announce(rig)
+    tell(f"would push {rig.control.distance_m:g} m at {rig.control.push_speed_m_per_s:g} m/s; nothing was opened")
+    if args.json:
+        say_json(facts)
+    return 0
+
+
+def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+    """Run the processes of a wall-clock run and return its summary."""
+    launcher = None
+    try:
+        from tools.run.launcher import Launcher
+
+        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig))
+        figures = launcher.run()
+    except BaseException:
+        if launcher is None or not launcher.began:
+            run_dir.discard(out)
+        raise
+    keep_tare(rig, figures)
+    return verdict.summary(
+        rig,
+        figures,
+        out=out,
+        log=launcher.log,
+        seed=args.seed,
+        level=level_of(rig),
+        devices=launcher.devices(figures),
+        notes=launcher.notes,
+    )
+
+
+def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+    """Run level sim in this process and return its summary."""
+    from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
+
+    text = run_dir.write_config(out, rig)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
+    try:
+        one = Lockstep(rig, args.seed, log, saved=saved)
+    except PushError:  # a world that cannot be: nothing has begun
+        log.abandon()
+        run_dir.discard(out)
+        raise
+    stop_on_signals(one)
+    live = LiveLine(rig, quiet=args.fast)
+    pace = WallPace(1.0 / rig.loop.rate_hz)
+    every = max(1, round(rig.loop.rate_hz / 5.0))
+
+    def on_tick(inp: TickInput, state: TickState, output: TickOutput) -> None:
+        if not args.fast:
+            pace.wait()
+            if inp.tick % every == 0:
+                live.show(status_line(inp, state, output))
+
+    try:
+        try:
+            figures = one.run(on_tick)
+        finally:
+            log.finish({})
+    except OSError as error:  # nothing but the log is outside of this process here
+        log.abandon()
+        raise EnvironmentFault(
+            f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Make room there"
+        ) from None
+    live.end()
+    keep_tare(rig, figures)
+    return verdict.summary(
+        rig,
+        figures,
+        out=out,
+        log=out / "run.mcap",
+        seed=args.seed,
+        level="sim",
+        devices=figures["devices"],
+        notes=[],
+    )
+
+
+def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
+    """Keep the tare of a run that got that far, for `--start-in-contact`; when it cannot be, say so."""
+    if figures["tared"]:
+        bias = (*figures["bias_force_N"], *figures["bias_torque_Nm"])
+        try:
+            saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
+        except (OSError, EnvironmentFault) as error:
+            tell(f"the tare was not kept: {error}")
+
+
+def write_summary(summary: dict[str, Any], out: Path) -> None:
+    """Write summary.json; when it cannot be, say so: the verdict is printed all the same."""
+    try:
+        run_dir.write_json(out / "summary.json", summary)
+    except OSError as error:
+        tell(f"summary.json cannot be written: {error.strerror}")
+
+
+def report(summary: dict[str, Any], out: Path, ready: ReportProcess | None) -> None:
+    """Write report.html, by the process that is `ready` or a new one, and name it in `summary`."""
+    try:
+        making = ready or ReportProcess(Path(summary["log"]), out / "report.html")
+        reason = making.make()
+    except EnvironmentFault as fault:
+        reason = str(fault)
+    if reason:
+        tell(f"no report: {reason}; `push report {out}` makes one from the log")
+    else:
+        summary["report"] = str(out / "report.html")
+
+
+class _NoLock:
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, *_: object) -> None:
+        return None

@@ -1,0 +1,258 @@
+"""`push tune`: from what is known of the sliders to gains: the stable region, a recommendation, and what it costs.
+
+The region is the closed form of `sim_backend.physics.gain_limits` over all assumed sliders; where it binds, it is
+found again by simulation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from robot_io.error_report import say_json, tell
+from robot_io.errors import UsageError
+from sim_backend.physics.assumed_sliders import pushed_body, samples
+from sim_backend.physics.floor import FloorEffects
+from sim_backend.physics.gain_limits import (
+    PushedBody,
+    fast_loop_k_f,
+    frictionless_limit,
+    limit,
+    offset_per_degree_m,
+    offset_per_newton_m,
+    sticking_limit,
+)
+from sim_backend.physics.slider import Circle, Pressure, Rectangle
+from tools.study.tune_map import PRESETS
+
+Word = TypeVar("Word", bound=str)
+SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
+PRESSURES: tuple[Pressure, ...] = ("uniform", "rim", "point")
+MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
+SHARE = 0.5
+"""The recommended k_y is this share of its limit: twice the gain, or half the margin assumed, is still stable."""
+CHECK_WITHIN = 0.01
+"""How closely simulation has to find the closed form's limits."""
+MOST_K_F_SHARE = 0.5
+"""The recommended k_f stays below this share of the one at which the force angle itself runs away."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("--shapes", default="box,circle", help="box, circle or both (default: box,circle)")
+    parser.add_argument("--size-m", default="0.3,0.7", metavar="LOW,HIGH", help="length along the push, or diameter")
+    parser.add_argument("--width-m", metavar="LOW,HIGH", help="width of a box across the push (default: as long)")
+    parser.add_argument("--pressures", default="uniform,rim", help="of uniform, rim, point (default: uniform,rim)")
+    parser.add_argument(
+        "--turning", choices=("ellipsoid", "along-push"), default="ellipsoid",
+        help="what resists turning: the ellipsoid (default, cautious), or the pressure along the push",
+    )  # fmt: skip
+    parser.add_argument("--ball-radius-m", type=float, default=0.05, metavar="M", help="radius of the contact ball")
+    parser.add_argument(
+        "--push-height-m", type=float, default=0.15, metavar="M", help="height of the push above the floor"
+    )
+    parser.add_argument("--floor-friction", type=float, default=0.3, metavar="MU", help="friction of the floor")
+    parser.add_argument(
+        "--anisotropy", type=float, default=1.0, metavar="RATIO", help="floor friction along the path over across"
+    )
+    parser.add_argument(
+        "--slide-force-N", type=float, default=15.0, metavar="N", help="force that keeps a slider moving"
+    )
+    parser.add_argument(
+        "--k-f", type=float, default=0.3, metavar="K_F", help="k_f to recommend a k_y for (default: 0.3)"
+    )
+    parser.add_argument("--out", help="folder for the map (default: sweeps/tune-TIME)")
+    parser.add_argument("--no-check", action="store_true", help="leave out the simulations")
+    parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Tune and tell; return the exit code."""
+    bodies = assumed_bodies(args)
+    fast = fast_loop_k_f(bodies)
+    if not (math.isfinite(args.k_f) and args.k_f > 0):
+        raise UsageError("this is not a positive, finite number", where="--k-f")
+    k_f = args.k_f if args.k_f <= MOST_K_F_SHARE * fast else _rounded_down(max(MOST_K_F_SHARE * fast, 1e-9))
+    highest = limit(bodies, k_f)
+    if highest <= 0:
+        raise UsageError(
+            f"no k_y is stable for all these sliders at k_f = {k_f:.3g}",
+            do="Raise --k-f, or assume less of the sliders",
+        )
+    k_y = _rounded_down(SHARE * highest)
+    out = _folder(args.out)
+    checks = [] if args.no_check else check(bodies, k_f)
+    what = f"{args.shapes} of {args.size_m} m, pressure {args.pressures}, ball {args.ball_radius_m:g} m"
+    files = _draw(bodies, (k_f, k_y), what, out)
+    result: dict[str, Any] = {
+        "assumed": len(bodies),
+        "recommended": {"k_f": k_f, "k_y_rad_per_m": k_y},
+        "limit_k_y_rad_per_m": highest,
+        "share_of_limit": k_y / highest,
+        "margin": highest / k_y,
+        "fast_loop_k_f": fast,
+        "offset_m_per_degree": offset_per_degree_m(k_f, k_y),
+        "offset_m_per_newton": offset_per_newton_m(k_f, k_y, args.slide_force_N),
+        "limits": [{"k_f": f, "k_y_rad_per_m": limit(bodies, f)} for f in MAP_K_F],
+        "presets": [
+            {
+                "name": name,
+                "k_f": f,
+                "k_y_rad_per_m": y,
+                "share_of_limit": y / top if (top := limit(bodies, f)) > 0 else None,
+            }
+            for name, (f, y) in PRESETS.items()
+        ],
+        "checks": checks,
+        "checks_within": CHECK_WITHIN,
+        "checks_passed": all(abs(entry["difference"]) <= CHECK_WITHIN for entry in checks) if checks else None,
+        "out": str(out),
+        "files": files,
+    }
+    _tell(result, args)
+    if args.json:
+        say_json({"schema": 1, **result})
+    return 0
+
+
+def assumed_bodies(args: argparse.Namespace) -> list[PushedBody]:
+    """Return the sliders the arguments assume: the corners of their ranges and some between. Raises UsageError."""
+    lengths = _between(args.size_m, "--size-m")
+    widths = _between(args.width_m, "--width-m") if args.width_m else None
+    shapes = _words(args.shapes, SHAPES, "--shapes")
+    pressures = _words(args.pressures, PRESSURES, "--pressures")
+    for name in ("ball_radius_m", "push_height_m", "floor_friction"):
+        if not 0 <= getattr(args, name) < math.inf:
+            raise UsageError("this is not a number of at least 0", where=f"--{name.replace('_', '-')}")
+    for name in ("anisotropy", "slide_force_N"):
+        if not 0 < getattr(args, name) < math.inf:
+            raise UsageError("this is not a positive, finite number", where=f"--{name.replace('_', '-')}")
+    effects = FloorEffects(
+        shift_m=args.floor_friction * args.push_height_m, turning=args.turning, along_over_across=args.anisotropy
+    )
+    bodies = []
+    for length in lengths:
+        outlines: list[Circle | Rectangle] = []
+        if "box" in shapes:
+            outlines += [Rectangle(length, width) for width in widths or [length]]
+        outlines += [Circle(length / 2)] if "circle" in shapes else []
+        bodies += [
+            pushed_body(outline, pressure, effects, args.ball_radius_m)
+            for outline in outlines
+            for pressure in pressures
+        ]
+    return bodies
+
+
+def check(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
+    """Find the limit of the sliders that bind, one a formula, by simulation; return both and their difference."""
+    from tools.study.gain_check import simulated_limit
+
+    formulas: dict[str, Callable[[PushedBody, float], float]] = {
+        "sticking": sticking_limit,
+        "frictionless": frictionless_limit,
+    }
+    found = []
+    for shape, chosen in (("box", [b for b in bodies if not b.round]), ("circle", [b for b in bodies if b.round])):
+        for contact, formula in formulas.items() if chosen else ():
+            body = min(chosen, key=partial(_at, formula, k_f))
+            expected = formula(body, k_f)
+            simulated = simulated_limit(body, k_f, frictionless=contact == "frictionless", near=expected)
+            found.append(
+                {
+                    "shape": shape,
+                    "contact": contact,
+                    "rho_m": body.rho_m,
+                    "d_m": body.d_m,
+                    "closed_form_k_y": expected,
+                    "simulated_k_y": simulated,
+                    "difference": simulated / expected - 1,
+                }
+            )
+    return found
+
+
+def _at(formula: Callable[[PushedBody, float], float], k_f: float, body: PushedBody) -> float:
+    return formula(body, k_f)
+
+
+def _tell(result: dict[str, Any], args: argparse.Namespace) -> None:
+    best = result["recommended"]
+    tell(
+        f"recommended: k_f {best['k_f']:.3g}, k_y {best['k_y_rad_per_m']:.3g} rad/m, a margin of "
+        f"{result['margin']:.2g} to the limit {result['limit_k_y_rad_per_m']:.3g} rad/m over {result['assumed']} "
+        "assumed sliders"
+    )
+    if best["k_f"] < args.k_f:
+        tell(
+            f"  k_f {args.k_f:g} is not taken: beyond {result['fast_loop_k_f']:.3g} the force's direction runs away "
+            f"for some slider, and the recommended k_f stays below {MOST_K_F_SHARE:g} of that"
+        )
+    tell(
+        f"what it costs: {result['offset_m_per_degree']:.2g} m of steady offset for each degree of error in the "
+        f"force's direction, {result['offset_m_per_newton']:.2g} m for each newton of bias at {args.slide_force_N:g} N"
+    )
+    for preset in result["presets"]:
+        share = preset["share_of_limit"]
+        told = "no k_y is stable at this k_f" if share is None else f"{share:.2f} of the limit"
+        tell(f"  {preset['name']} {preset['k_f']:g}/{preset['k_y_rad_per_m']:g}: {told}")
+    for entry in result["checks"]:
+        tell(
+            f"  simulated: {entry['shape']} {entry['contact']}, limit {entry['simulated_k_y']:.4g} "
+            f"(closed form {entry['closed_form_k_y']:.4g}, {100 * entry['difference']:+.2f} %)"
+        )
+    tell(f"map in {result['out']}: {', '.join(result['files'])}")
+
+
+def _draw(bodies: Sequence[PushedBody], recommended: tuple[float, float], what: str, out: Path) -> list[str]:
+    from tools.study.figures import save
+    from tools.study.tune_map import draw
+
+    fast = fast_loop_k_f(bodies)  # a cliff, not a slope
+    k_f = sorted((*MAP_K_F, *((math.nextafter(fast, 0.0), fast) if MAP_K_F[0] < fast < MAP_K_F[-1] else ())))
+    return save(draw([(f, limit(bodies, f)) for f in k_f], recommended, what), out, "gain_map")
+
+
+def _folder(out: str | None) -> Path:
+    path = Path(out) if out else Path("sweeps") / f"tune-{time.strftime('%Y%m%d-%H%M%S')}"
+    try:
+        if path.exists() and any(path.iterdir()):
+            raise UsageError("this folder is not empty", where=str(path), do="Give another --out")
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"this folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
+        ) from None
+    return path
+
+
+def _between(text: str, where: str) -> list[float]:
+    """Return samples of a range `low,high`, both ends among them."""
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        low = high = math.nan
+    if not 0 < low <= high < math.inf:
+        raise UsageError(
+            f"`{text}` is not a range of two positive lengths", where=where, do=f"For example {where}=0.3,0.7"
+        )
+    return samples(low, high)
+
+
+def _words(text: str, known: tuple[Word, ...], where: str) -> list[Word]:
+    by_name = {str(word): word for word in known}
+    for word in text.split(","):
+        if word not in by_name:
+            raise UsageError(f"`{word}` is not one of {', '.join(known)}", where=where)
+    return [by_name[word] for word in text.split(",")]
+
+
+def _rounded_down(value: float) -> float:
+    """Return a value rounded down to two digits, so that it reads well and keeps its margin."""
+    scale = 10.0 ** (1 - math.floor(math.log10(value)))
+    return math.floor(value * scale + 1e-9) / scale

@@ -1,0 +1,1 @@
+"""What only developers run: pages made from the code."""

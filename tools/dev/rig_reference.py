@@ -1,0 +1,117 @@
+"""Writes docs/rig-files.md from the types of `robot_io/rig`.
+
+python -m tools.dev.rig_reference > docs/rig-files.md
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+from types import UnionType
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+from robot_io.rig import config, topics, world
+from robot_io.rig.config import RigConfig
+
+INTRO = """# Rig files
+
+A rig file is TOML and describes one robot, real or not. `push run NAME` takes a shipped one (`sim`, `emulated`,
+`barrel`, `paper-gains`, `thing`), `push run FILE` yours. Write only what differs:
+
+    extends = "emulated"
+    name = "mine"
+
+    [control]
+    push_speed_m_per_s = 0.08
+
+`push config show RIG` prints every value, `push config check RIG` reports every mistake at once, and
+`--set control.k_f=0.1` changes one value for one run. The unit is in the key; ranges are checked; an unknown key names
+the nearest known one. The program's own ceilings (`safety/limits.py`) may only be lowered.
+
+`level` is set for each device: `sim` (all three or none), `emulated` (the real driver on a wire emulator) or
+`hardware`; the last two mix. `ft.port` is a device path, a pty or `socket://host:port`.
+"""
+
+
+def reference() -> str:
+    """Return the page."""
+    parts = [INTRO]
+    notes = _field_notes()
+    for title, table in _tables(RigConfig, ""):
+        parts.append(f"\n## {f'[{title}]' if title else 'At the top'}\n")
+        doc = inspect.cleandoc(table.__doc__ or "")
+        parts.append(doc + "\n")
+        parts.append("| key | type and range | default | |\n|---|---|---|---|")
+        hints = get_type_hints(table, include_extras=True)
+        for field in msgspec.structs.fields(table):
+            if _is_table(hints[field.name]):
+                continue
+            note = notes.get((table.__name__, field.name), "").replace("\n", " ").replace("|", "\\|")
+            parts.append(f"| `{field.name}` | {_type_text(hints[field.name])} | {_default(field)} | {note} |")
+    return "\n".join(parts) + "\n"
+
+
+def _tables(table: type[msgspec.Struct], prefix: str) -> list[tuple[str, type[msgspec.Struct]]]:
+    found = [(prefix, table)]
+    hints = get_type_hints(table)
+    for field in msgspec.structs.fields(table):
+        if _is_table(hints[field.name]):
+            found += _tables(hints[field.name], f"{prefix}.{field.name}" if prefix else field.name)
+    return found
+
+
+def _is_table(hint: Any) -> bool:
+    return isinstance(hint, type) and issubclass(hint, msgspec.Struct)
+
+
+def _type_text(hint: Any) -> str:
+    if get_origin(hint) is Annotated:
+        base, *extras = get_args(hint)
+        bounds = [b for extra in extras if isinstance(extra, Meta) for b in _bounds(extra)]
+        return ", ".join([_type_text(base), *bounds])
+    if get_origin(hint) is Literal:
+        return " \\| ".join(f"`{value}`" for value in get_args(hint))
+    if get_origin(hint) is tuple:
+        parts = get_args(hint)
+        return f"{len(parts)} x {_type_text(parts[0])}"
+    if isinstance(hint, UnionType):
+        return " or ".join(_type_text(part) for part in get_args(hint))
+    return {float: "number", int: "integer", str: "text", bool: "true or false"}.get(hint, str(hint))
+
+
+def _bounds(meta: Meta) -> list[str]:
+    signs = (("> ", meta.gt), (">= ", meta.ge), ("< ", meta.lt), ("<= ", meta.le))
+    return [f"{sign}{bound:g}" for sign, bound in signs if bound is not None]
+
+
+def _default(field: msgspec.structs.FieldInfo) -> str:
+    if field.default is msgspec.NODEFAULT:
+        return "required"
+    if isinstance(field.default, tuple):
+        return f"`{list(field.default)}`"
+    return f"`{field.default!r}`".replace("'", '"')
+
+
+def _field_notes() -> dict[tuple[str, str], str]:
+    """Return the text below each field of the source, by (class, field)."""
+    notes = {}
+    for node in (node for module in (config, topics, world) for node in ast.parse(inspect.getsource(module)).body):
+        if not isinstance(node, ast.ClassDef):
+            continue
+        for field, text in zip(node.body, node.body[1:], strict=False):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(field.target, ast.Name)
+                and isinstance(text, ast.Expr)
+                and isinstance(text.value, ast.Constant)
+            ):
+                notes[node.name, field.target.id] = str(text.value.value)
+    return notes
+
+
+if __name__ == "__main__":
+    sys.stdout.write(reference())

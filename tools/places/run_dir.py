@@ -1,0 +1,74 @@
+"""The folder of a run: created, never overwritten."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import time
+from pathlib import Path
+
+from robot_io.errors import UsageError
+from robot_io.rig.config import RigConfig, rig_to_toml
+
+MOST_IN_A_SECOND = 1000
+RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
+
+
+def create(out: str | None, rig_name: str) -> Path:
+    """Create and return the run's folder (default: `runs/RIG-TIME`, with a number when there is one already).
+
+    Raises UsageError when it already holds a run, or cannot be made.
+    """
+    path = Path(out) if out else Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    try:
+        if any((path / name).exists() for name in RUN_FILES) and out:
+            raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
+        path = _made(path, given=bool(out))
+        probe = path / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise UsageError(
+            f"the run's folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
+        ) from None
+    return path
+
+
+def _made(path: Path, *, given: bool) -> Path:
+    """Make the folder; one that was not given must be new, because runs may start within the same second."""
+    if given:
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+    for number in range(1, MOST_IN_A_SECOND):
+        numbered = path if number == 1 else path.with_name(f"{path.name}-{number}")
+        with contextlib.suppress(FileExistsError):
+            numbered.mkdir(parents=True)
+            return numbered
+    raise FileExistsError(errno.EEXIST, "too many runs at the same time", str(path))
+
+
+def discard(path: Path) -> None:
+    """Remove the files of a run that never began, and the folder when nothing else is in it."""
+    for name in RUN_FILES:
+        (path / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        path.rmdir()
+
+
+def write_config(path: Path, rig: RigConfig) -> str:
+    """Write the resolved rig to `config.toml` and return its text."""
+    text = rig_to_toml(rig)
+    (path / "config.toml").write_text(text, encoding="utf-8")
+    return text
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write a JSON file whole or not at all."""
+    part = path.with_suffix(".part")
+    try:
+        part.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise

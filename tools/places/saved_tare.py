@@ -1,0 +1,63 @@
+"""A tare kept for `--start-in-contact`: valid for the same sensor, as long as it stays powered.
+
+The FT 300 has no power-on counter, so a saved tare counts only on the same boot of this machine and for half a
+day; an emulated or simulated sensor is "powered" as long as its settings stay the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from pathlib import Path
+
+import msgspec
+
+from robot_io.errors import UsageError
+from robot_io.rig.config import RigConfig
+from robot_io.tick import Vector6
+from tools.places.state_dir import file_name, state_dir
+
+MAX_AGE_S = 12 * 3600.0
+
+
+class SavedTare(msgspec.Struct, frozen=True):
+    """Bias in N and N*m (SENSOR frame), and what it is valid for: the joints of the arm (rad), the power cycle."""
+
+    bias: Vector6
+    joints: Vector6
+    power_cycle: str
+    saved_s: float
+
+
+def power_cycle(rig: RigConfig) -> str:
+    """Return what stands for the sensor's power cycle."""
+    if rig.ft.level == "hardware":
+        return f"{rig.ft.port} {Path('/proc/sys/kernel/random/boot_id').read_text().strip()}"
+    parts = msgspec.json.encode((rig.world.sensor, rig.frames, rig.arm.held_pose_rad))
+    return hashlib.sha256(parts).hexdigest()
+
+
+def save(rig: RigConfig, bias: Vector6, joints: Vector6) -> None:
+    """Keep a tare for later runs of this rig."""
+    tare = SavedTare(bias, joints, power_cycle(rig), time.time())
+    _path(rig).write_bytes(msgspec.json.encode(tare))
+
+
+def load(rig: RigConfig) -> SavedTare:
+    """Return the saved tare. Raises UsageError when there is none that is valid now."""
+    try:
+        tare = msgspec.json.decode(_path(rig).read_bytes(), type=SavedTare)
+    except (OSError, msgspec.MsgspecError):
+        tare = None
+    age_s = time.time() - tare.saved_s if tare else 0.0
+    if tare is None or tare.power_cycle != power_cycle(rig) or not 0.0 <= age_s <= MAX_AGE_S:
+        raise UsageError(
+            "--start-in-contact needs a tare saved in this power cycle of the sensor, and there is none",
+            where=rig.name,
+            do="Run a push that starts out of contact first; it saves one",
+        )
+    return tare
+
+
+def _path(rig: RigConfig) -> Path:
+    return state_dir() / f"{file_name(rig.name)}.tare.json"

@@ -1,0 +1,200 @@
+"""The recorder process: drains the rings of a run into its log, and finishes the log when control is gone.
+
+    python -m tools.run.recorder  < one line of JSON: {
+        "out_path": "DIR/run.mcap", "config_text": "...", "metadata": {"seed": "0"}, "wall_offset_ns": N,
+        "rings": [{"name": "control", "fd": 5}, {"name": "gate", "fd": 6}, {"name": "world", "fd": 7}],
+        "alive_fds": [8, 9, 10], "status_fd": 11}
+
+`alive_fds` are read ends of pipes, one for each ring and in the same order; only the producer holds the write end, so
+that EOF means it is gone. The first is control's: its end is the end of the run. The others then have 1.5 s.
+
+It has no other way to be told to stop: SIGINT, SIGTERM and SIGHUP are ignored, because whoever sends them to a
+process group would cut the log. On `status_fd` it writes one JSON line each for "ready", "error" and "finished".
+When the disk fails it says so, keeps draining, so that no producer notices, and counts what was lost; exit code 1.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from robot_io.clock import NS_PER_MS, monotonic_ns, wall_offset_ns
+from robot_io.errors import LogDamaged, PushError
+from robot_io.ipc.event_loop import HANGUP, READ, EventLoop
+from robot_io.ipc.ring import Ring
+from tools.log.run_log import RunLog
+
+POLL_NS = 20 * NS_PER_MS
+FLUSH_NS = 250 * NS_PER_MS
+OTHERS_MAX_NS = 1500 * NS_PER_MS
+FINAL_DRAIN_MAX_NS = 5000 * NS_PER_MS
+"""Against a producer that is still there and pushes faster than the disk takes it."""
+_BATCH = 1000
+
+
+class RingSource(msgspec.Struct, frozen=True):
+    """A ring to drain: its name in the log's metadata and its memfd."""
+
+    name: str
+    fd: int
+
+
+class Job(msgspec.Struct, frozen=True):
+    """What to record; see the module's own text."""
+
+    out_path: str
+    config_text: str
+    metadata: dict[str, str]
+    wall_offset_ns: int
+    rings: list[RingSource]
+    alive_fds: list[int]
+    status_fd: int
+
+
+class Recorder:
+    """Drains rings into one log until every producer is gone."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._rings = {source.name: Ring(source.fd) for source in job.rings}
+        self._counts = dict.fromkeys(self._rings, 0)
+        self._alive = set(job.alive_fds)
+        os.set_blocking(job.status_fd, False)  # a launcher that does not read must not stop the recording
+        self._lost = 0
+        self._disk_failed = False
+        self._control_gone_ns: int | None = None
+        self._loop = EventLoop()
+        self._log = RunLog(
+            Path(job.out_path),
+            config_text=job.config_text,
+            metadata=job.metadata,
+            wall_offset_ns=job.wall_offset_ns,
+        )
+
+    def run(self) -> int:
+        """Record until the end of the run; return the exit code."""
+        for fd in self._job.alive_fds:
+            self._loop.add_fd(fd, partial(self._on_alive, fd), READ | HANGUP)
+        self._loop.call_every(POLL_NS, self._on_poll)
+        self._loop.call_every(FLUSH_NS, lambda _: self._flush())
+        self._say("ready", path=self._job.out_path)
+        self._loop.run()
+        until_ns = monotonic_ns() + FINAL_DRAIN_MAX_NS
+        while self._drain() and monotonic_ns() < until_ns:  # what came while the last producer went
+            continue
+        self._finish()
+        self._loop.close()
+        return 1 if self._disk_failed else 0
+
+    def _on_alive(self, fd: int, _: int) -> None:
+        if os.read(fd, 4096):
+            return
+        self._loop.remove_fd(fd)
+        self._alive.discard(fd)
+        if fd == self._job.alive_fds[0]:
+            self._control_gone_ns = monotonic_ns()
+        self._end_when_due()
+
+    def _on_poll(self, _: int) -> None:
+        self._drain()
+        self._end_when_due()
+
+    def _end_when_due(self) -> None:
+        gone_ns = self._control_gone_ns
+        if gone_ns is not None and (not self._alive or monotonic_ns() - gone_ns >= OTHERS_MAX_NS):
+            self._loop.stop()
+
+    def _drain(self) -> bool:
+        """Write what is in the rings, a bounded part at a time; tell whether there was anything."""
+        found = False
+        for name, ring in self._rings.items():
+            try:
+                records = ring.pop_all(_BATCH)
+            except LogDamaged as damage:
+                self._error(damage.what, ring=name)
+                continue
+            found = found or bool(records)
+            self._counts[name] += len(records)
+            for kind, time_ns, payload in records:
+                self._write(kind, time_ns, payload)
+        return found
+
+    def _write(self, kind: int, time_ns: int, payload: bytes) -> None:
+        if self._disk_failed:
+            self._lost += 1
+            return
+        try:
+            self._log.record(kind, time_ns, payload)
+        except OSError as error:
+            self._disk_error(error)
+
+    def _flush(self) -> None:
+        if not self._disk_failed:
+            try:
+                self._log.flush()
+            except OSError as error:
+                self._disk_error(error)
+
+    def _disk_error(self, error: OSError) -> None:
+        self._disk_failed = True
+        self._log.abandon()
+        self._error(f"the log cannot be written any more: {error.strerror}", path=self._job.out_path)
+
+    def _finish(self) -> None:
+        dropped = {name: ring.dropped for name, ring in self._rings.items()}
+        facts = {f"records_{name}": str(count) for name, count in self._counts.items()}
+        facts |= {f"dropped_{name}": str(count) for name, count in dropped.items()}
+        facts["wall_offset_ns_at_end"] = str(wall_offset_ns())
+        if not self._disk_failed:
+            try:
+                self._log.finish(facts)
+            except OSError as error:
+                self._disk_error(error)
+        self._say(
+            "finished",
+            complete=not self._disk_failed,
+            messages=self._log.messages,
+            ticks=self._log.chain.ticks,
+            records=self._counts,
+            dropped=dropped,
+            lost=self._lost,
+            undecodable=self._log.undecodable,
+        )
+
+    def _error(self, what: str, **more: object) -> None:
+        self._say("error", what=what, **more)
+
+    def _say(self, event: str, **more: object) -> None:
+        say(self._job.status_fd, {"event": event, **more})
+
+
+def say(fd: int, value: dict[str, Any]) -> None:
+    """Write one JSON line; nobody listening is no reason to stop recording."""
+    try:
+        os.write(fd, json.dumps(value).encode() + b"\n")
+    except OSError:
+        return
+
+
+def main() -> int:
+    """Read the job from stdin and record; return the exit code."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    job = msgspec.json.decode(sys.stdin.buffer.readline(), type=Job)
+    try:
+        recorder = Recorder(job)
+    except PushError as error:
+        say(job.status_fd, {"event": "error", "what": error.what, "where": error.where, "do": error.do})
+        return error.exit_code
+    return recorder.run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,52 @@
+"""What `push run` says about gains that leave little room, for the sliders its rig assumes."""
+
+from __future__ import annotations
+
+import contextlib
+
+from robot_io.errors import ConfigError
+from robot_io.rig.config import RigConfig
+from sim_backend.physics.assumed_sliders import pushed_body, samples
+from sim_backend.physics.floor import FloorEffects
+from sim_backend.physics.gain_limits import WARN_SHARE, PushedBody, limit
+from sim_backend.physics.slider import Circle, Rectangle
+from sim_backend.world.scene import slider_model
+from tools.rig import devices_at
+
+
+def gain_warning(rig: RigConfig) -> str | None:
+    """Return one sentence if a rig's gains are beyond 0.7 of the limit for a slider it may meet, else None.
+
+    Raises ConfigError when the simulated slider cannot be.
+    """
+    control, bodies = rig.control, _bodies(rig)
+    if control.controller != "force" or not bodies:
+        return None
+    highest = limit(bodies, control.k_f)
+    if control.k_y_rad_per_m <= WARN_SHARE * highest:
+        return None
+    told = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
+    return (
+        f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may weave: for the sliders of this rig at this k_f "
+        f"{told}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds others"
+    )
+
+
+def _bodies(rig: RigConfig) -> list[PushedBody]:
+    """Return the sliders of `[sliders]`, and the simulated one where there is one."""
+    world, pressure = rig.world, rig.sliders.pressure
+    effects = FloorEffects(
+        shift_m=world.slider.floor_friction * world.floor.push_height_m,
+        turning=world.floor.turning,
+        along_over_across=world.floor.along_over_across,
+    )
+    bodies = []
+    for length in samples(rig.sliders.shortest_m, rig.sliders.longest_m):
+        for outline in (Rectangle(length, length), Circle(length / 2)):
+            with contextlib.suppress(ConfigError):  # it would tip over: nobody pushes that one so high
+                bodies.append(pushed_body(outline, pressure, effects, world.ball_radius_m))
+    if not devices_at(rig, "hardware"):
+        shape = slider_model(world.slider).shape
+        assert isinstance(shape, Circle | Rectangle)
+        bodies.append(pushed_body(shape, world.slider.pressure, effects, world.ball_radius_m))
+    return bodies

@@ -1,0 +1,101 @@
+"""What the operator sees while it runs: one line, rewritten on a terminal, once a second elsewhere; faults whole."""
+
+from __future__ import annotations
+
+import math
+import os
+import select
+import sys
+import time
+from typing import Any
+
+from robot_io.rig.config import RigConfig
+from safety.faults import FAULTS
+
+USUAL_COLUMNS = 80
+"""Width of a terminal that does not say."""
+
+
+class LiveLine:
+    """Prints to stderr; never waits and never raises when nobody reads."""
+
+    def __init__(self, rig: RigConfig, *, quiet: bool = False) -> None:
+        self._rig = rig
+        self._quiet = quiet
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._last_s = 0.0
+        self._width = 0
+        self._faults: tuple[str, ...] = ()
+
+    def show(self, status: dict[str, Any]) -> None:
+        """Show one status of control."""
+        faults = tuple(status["faults"])
+        for fault in faults:
+            if fault not in self._faults:
+                self.say(f"{fault} {FAULTS[fault].text if fault in FAULTS else ''} -> {status['mode']}")
+        self._faults = faults
+        if self._quiet:
+            return
+        now_s = time.monotonic()
+        if not self._terminal and now_s - self._last_s < 1.0:
+            return
+        self._last_s = now_s
+        line = self._line(status)
+        if self._terminal:
+            # Cut, because a line that wraps cannot be rewritten: it would fill the screen.
+            room = self._room()
+            line = line[:room]
+            self._write(f"\r{line:<{min(self._width, room)}}")
+            self._width = len(line)
+        else:
+            self._write(line + "\n")
+
+    def say(self, text: str) -> None:
+        """Print a line of its own."""
+        if self._terminal and self._width:
+            self._write("\r" + " " * min(self._width, self._room()) + "\r")
+            self._width = 0
+        self._write(text + "\n")
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._terminal and self._width:
+            self._write("\n")
+            self._width = 0
+
+    def _line(self, status: dict[str, Any]) -> str:
+        # JSON has no NaN: a figure that is not known yet (no pose so far) arrives as null.
+        status = {key: math.nan if value is None else value for key, value in status.items()}
+        fx, fy, _ = status["force_N"]
+        control = self._rig.control
+        return (
+            f"{status['phase']:<9} {status['progress_m']:6.2f}/{control.distance_m:.2f} m  {status['mode']:<7}"
+            f"  off {status['lateral_m']:+.3f} m  |F| {math.hypot(fx, fy):5.1f}/{self._rig.limits.max_force_N:.0f} N"
+            f"  v {status['speed']:.2f} m/s  theta_p {math.degrees(status['theta_p']):+6.1f} deg"
+        )
+
+    @staticmethod
+    def _room() -> int:
+        """Return how many characters fit before the terminal's right edge; it may be resized at any time."""
+        try:
+            columns = os.get_terminal_size(sys.stderr.fileno()).columns
+        except (OSError, AttributeError, ValueError):
+            columns = 0
+        return (columns or USUAL_COLUMNS) - 1
+
+    def _write(self, text: str) -> None:
+        try:
+            if not self._would_block():
+                sys.stderr.write(text)
+                sys.stderr.flush()
+        except (OSError, AttributeError, ValueError):
+            return
+
+    def _would_block(self) -> bool:
+        """Tell whether nobody takes our lines now (a stopped terminal, a full pipe): then they are left out.
+
+        Whoever waits for the terminal cannot hear the operator.
+        """
+        poll = select.poll()
+        poll.register(sys.stderr.fileno(), select.POLLOUT)
+        return not poll.poll(0)

@@ -1,0 +1,77 @@
+"""Signals and keys of the operator, as events of an event loop."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import termios
+import tty
+from collections.abc import Callable
+from types import FrameType
+from typing import Any
+
+from robot_io.ipc.event_loop import EventLoop
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+"""What a terminal makes of Ctrl-C, Ctrl-\\ and Ctrl-Z is among them: keys like any other. A launcher that was put to
+sleep by Ctrl-Z would let the base push on, and hear no key."""
+
+
+class OperatorKeys:
+    """Calls `on_stop` for a signal or a key, `on_resume` for the key r; restores everything on `close`."""
+
+    def __init__(self, loop: EventLoop, on_stop: Callable[[], None], on_resume: Callable[[], None]) -> None:
+        self._loop = loop
+        self._on_stop, self._on_resume = on_stop, on_resume
+        self._pipe = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        # The pipe first: a signal that came between the two would be heard by nobody.
+        self._wakeup = signal.set_wakeup_fd(self._pipe[1])
+        self._handlers = [signal.signal(number, _note) for number in SIGNALS]
+        loop.add_fd(self._pipe[0], self._on_signal)
+        self._terminal: list[Any] | None = None
+        self._stdin = -1
+        with contextlib.suppress(OSError, ValueError, AttributeError, termios.error):
+            if sys.stdin.isatty():
+                self._stdin = sys.stdin.fileno()
+                self._terminal = termios.tcgetattr(self._stdin)
+                tty.setcbreak(self._stdin)
+                loop.add_fd(self._stdin, self._on_key)
+
+    def close(self) -> None:
+        """Restore handlers and terminal."""
+        signal.set_wakeup_fd(self._wakeup)
+        for number, handler in zip(SIGNALS, self._handlers, strict=True):
+            signal.signal(number, handler)
+        self._loop.remove_fd(self._pipe[0])
+        for fd in self._pipe:
+            os.close(fd)
+        if self._terminal is not None:
+            self._loop.remove_fd(self._stdin)
+            with contextlib.suppress(termios.error):  # the terminal is closed
+                # NOW, not DRAIN: a stopped terminal would never have shown everything.
+                termios.tcsetattr(self._stdin, termios.TCSANOW, self._terminal)
+            self._terminal = None
+
+    def _on_signal(self, _events: int) -> None:
+        with contextlib.suppress(BlockingIOError):
+            for number in os.read(self._pipe[0], 64):
+                if number in SIGNALS:
+                    self._on_stop()
+
+    def _on_key(self, _events: int) -> None:
+        try:
+            key = os.read(self._stdin, 1)
+        except OSError:  # the terminal is closed; SIGHUP says so too
+            key = b""
+        if not key:
+            self._loop.remove_fd(self._stdin)
+        elif key in (b"r", b"R"):
+            self._on_resume()
+        else:
+            self._on_stop()
+
+
+def _note(_number: int, _frame: FrameType | None) -> None:
+    """Do nothing: the byte in the wake-up pipe does it."""
