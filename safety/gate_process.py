@@ -126,6 +126,8 @@ class GateProcess:
             gone = not payload
         if frames:
             self._state = gate.on_frames(self._limits, self._state, frames, now_ns)
+            if not self._state.latch:  # silence counts from here: a pause while they were read is none of control's
+                self._state = replace(self._state, frame_ns=monotonic_ns())
             verdict = self._state.latch
             newest = frames[-1]
             accepted = newest.seq if newest is not None and not verdict else self._record.accepted_seq

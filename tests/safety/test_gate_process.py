@@ -15,8 +15,8 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.log.channels import Kind
 from robot_io.messages import BaseFeed, BaseOdometry, BaseRecord, BodyTwist, DeviceHealth, LinkState, Stamped
 from robot_io.rig.config import BaseConfig, FramesConfig
-from safety.gate import OWN_PAUSE_NS, GateLimits, Latch
-from safety.gate_process import LAST_ZEROS_NS, GateJob, GateProcess
+from safety.gate import GateLimits, Latch
+from safety.gate_process import GateJob, GateProcess
 
 LIMITS = GateLimits(0.15, 0.25, 0.5, 1.0, 10_000_000)
 FRAMES = FramesConfig(((1, 0, 0), (0, 1, 0), (0, 0, 1)), (0, 0, 0), (0, 0, 0))
@@ -95,12 +95,29 @@ def test_a_gate_that_was_frozen_lets_nothing_out_whatever_wakes_it_first(rig, wa
     rig.frame(SLOW)
     rig.gate._on_control(0)
     assert rig.base.told == [SLOW]
-    rig.gate._ran_ns -= OWN_PAUSE_NS + MS
+    rig.gate._ran_ns -= 101 * MS
     for _ in range(3):
         rig.frame(SLOW)
     getattr(rig.gate, wake)(0)
     assert rig.base.told[1:] == [ZERO]
     assert rig.record().latch_cause == Latch.PAUSED
+
+
+def test_a_pause_while_frames_are_read_is_no_silence_of_control(rig, monkeypatch):
+    """It falls between the look at the clock and the first frame, and seven frames come meanwhile."""
+    rig.frame(SLOW)
+    rig.gate._on_control(0)
+    began_ns = time.monotonic_ns()
+    for n in range(7):
+        sent_ns = began_ns + (n + 1) * 10 * MS
+        rig.control.send(pack_frame(GateFrame(2 + n, 2 + n, sent_ns, 2, SLOW)))
+    looks = iter([began_ns])
+    monkeypatch.setattr("safety.gate_process.monotonic_ns", lambda: next(looks, began_ns + 70 * MS))
+    rig.gate._on_control(0)
+    monkeypatch.setattr("safety.gate_process.monotonic_ns", lambda: began_ns + 72 * MS)
+    rig.gate._on_clock(0)
+    record = rig.record()
+    assert (record.latched, record.accepted_seq) == (False, 8)
 
 
 def test_over_a_lost_link_nothing_counts_as_sent(rig):
@@ -132,7 +149,7 @@ def test_the_last_zeros_go_on_until_the_base_rests(rig, measured, ends):
     rig.gate._on_control(0)
     stopped: list[bool] = []
     rig.gate._loop.stop = lambda: stopped.append(True)
-    since_ns = rig.gate._end_ns - LAST_ZEROS_NS
+    since_ns = rig.gate._end_ns - 500 * MS  # half a second
     rig.base.arrived.append(Stamped(BaseOdometry(measured), 0, since_ns + 130 * MS, 0.0))
     rig.gate._on_clock(0)
     assert bool(stopped) == ends
