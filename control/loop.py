@@ -36,8 +36,8 @@ from robot_io.tick import (
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
 LOG_LOST = b"L"[0]
 """The launcher says that the recorder cannot write any more: as good as gone."""
-MAX_READINGS = 64
-"""More packets than this in one tick (0.64 s of them) are a flood; the oldest go."""
+FLOOD_S = 0.64
+"""More packets in one tick than the sensor gives in this time are a flood; the oldest go."""
 
 Fold = Callable[[TickState, TickInput], tuple[TickState, TickOutput]]
 
@@ -83,6 +83,7 @@ class ControlLoop:
         state: TickState,
         *,
         rate_hz: float,
+        sensor_rate_hz: float,
         sensor: Sensor,
         arm: Arm,
         base: GateLink,
@@ -103,6 +104,7 @@ class ControlLoop:
         self._loop = EventLoop()
         self._timer: Timer | None = None
         self._tick = -1
+        self._most_readings = round(FLOOD_S * sensor_rate_hz)
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator = Operator.NONE
         self._arm_record = ArmRecord()
@@ -136,7 +138,7 @@ class ControlLoop:
 
     def _collect(self) -> None:
         self._readings.extend(self._sensor.drain())
-        del self._readings[:-MAX_READINGS]
+        del self._readings[: -self._most_readings]
 
     def _on_operator(self, _events: int) -> None:
         try:

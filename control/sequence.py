@@ -10,7 +10,7 @@ from control import open_loop, push_law
 from control.sensing import in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
-from control.tare import judge
+from control.tare import Judgement, judge
 from robot_io.messages import LinkState
 from robot_io.tick import ControlState, Operator, Phase, TareSums, TickInput
 
@@ -116,7 +116,7 @@ def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float)
         return replace(state, tare=TareSums())
     if state.refusal or state.tare.count < settings.tare_readings:
         return state
-    judged = judge(state.tare, settings.ft.noise_force_N, settings.ft.noise_torque_Nm)
+    judged = judge_tare(settings, state)
     if judged.refusal:
         return replace(state, refusal=int(judged.refusal))
     bias = judged.tare.bias
@@ -133,7 +133,7 @@ def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float)
 
 def _approach(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
     control = settings.control
-    if state.contact_run >= control.contact_samples:
+    if state.contact_run >= settings.contact_readings:
         return _enter(
             state,
             Phase.PUSH,
@@ -243,5 +243,10 @@ def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlSt
         return replace(state, speed=0.0, tare=TareSums())
     if state.tare.count < settings.tare_readings:
         return state
-    mean = judge(state.tare, settings.ft.noise_force_N, settings.ft.noise_torque_Nm).tare.bias
+    mean = judge_tare(settings, state).tare.bias
     return _enter(state, Phase.DONE, inp.now_ns, residual_N=math.dist(mean[:3], state.bias_force))
+
+
+def judge_tare(settings: Settings, state: ControlState) -> Judgement:
+    """Return what the readings summed up so far come to, by what the sensor declares of itself."""
+    return judge(state.tare, settings.sensor_noise, settings.sensor_range, settings.sensor_resolution)

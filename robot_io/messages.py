@@ -1,8 +1,8 @@
 """The message types that flow between drivers, control and safety.
 
 Frames: WORLD is the fixed frame of the base localisation (x, y on the floor, z up, yaw about z). BODY is the
-base's own frame (x forward, y left). SENSOR is the FT 300's frame (+z out of the tool side). A twist or a
-wrench in one frame is a different type from the same in another, so that a mix-up is a type error.
+base's own frame (x forward, y left). SENSOR is the frame of the force-torque sensor (FT 300: +z out of the tool
+side). A twist or a wrench in one frame is a different type from the same in another, so that a mix-up is a type error.
 All are frozen, built of floats, ints and tuples, in SI units.
 """
 
@@ -15,6 +15,7 @@ import msgspec
 
 T = TypeVar("T")
 _NAN = float("nan")
+Vector6 = tuple[float, float, float, float, float, float]
 
 
 class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
@@ -27,7 +28,7 @@ class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
 
 
 class SensorWrench(msgspec.Struct, frozen=True, gc=False):
-    """What the FT 300 reports: N and N*m in the SENSOR frame, bias and tool weight still in it."""
+    """What a force-torque sensor reports: N and N*m in the SENSOR frame, bias and tool weight still in it."""
 
     fx: float
     fy: float

@@ -6,10 +6,15 @@ import math
 
 import msgspec
 
-from robot_io.messages import Joints
+from robot_io.messages import Joints, Vector6
 from robot_io.rig.config import RigConfig
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
+
+SATURATED = 0.95
+"""Share of the sensor's range."""
+FROZEN_S = 0.3
+"""Readings that stay equal for this long, by the rate that the sensor declares, are a fault."""
 
 
 class SafetySettings(msgspec.Struct, frozen=True, gc=False):
@@ -19,6 +24,10 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     max_force: float
     slow_force: float
     max_torque: float
+    saturated: Vector6
+    """Readings from which on an axis is taken for saturated: N, N*m."""
+    frozen_readings: int
+    """This many equal readings in a row are a fault."""
     noise_floor: bool
     """The sensor's readings scatter, so that equal ones are a fault."""
     held_pose: Joints
@@ -37,12 +46,15 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
         """Resolve the settings of a rig."""
         limits = rig.limits
         period_s = 1.0 / rig.loop.rate_hz
+        fx, fy, fz, mx, my, mz = rig.ft.declared.range
         return cls(
             round(period_s * 1e9),
             limits.max_force_N,
             limits.slow_force_N,
             limits.max_torque_Nm,
-            rig.ft.noise_force_N > 0.0,
+            (fx * SATURATED, fy * SATURATED, fz * SATURATED, mx * SATURATED, my * SATURATED, mz * SATURATED),
+            round(FROZEN_S * rig.ft.declared.rate_hz),
+            rig.ft.noise[0] > 0.0,
             rig.arm.held_pose_rad,
             rig.arm.held_pose_tolerance_rad,
             limits.hold_slow_rad,

@@ -25,5 +25,10 @@ Matrix3 = tuple[Vector3, Vector3, Vector3]
 Vector6 = tuple[float, float, float, float, float, float]
 
 
+_Plain = bool | int | float | str
+Options = dict[str, _Plain | list[_Plain]]
+"""Keys of a device's kind, whose meaning only its driver knows."""
+
+
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of a rig file: frozen, unknown keys refused."""

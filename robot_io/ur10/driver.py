@@ -16,12 +16,13 @@ import os
 import select
 import signal
 import subprocess
-from typing import IO
+from collections.abc import Mapping
+from typing import IO, Any, Self
 
 import msgspec
 
 from robot_io.clock import NS_PER_S, monotonic_ns
-from robot_io.driver import DriverBase
+from robot_io.driver import DriverBase, no_more_options
 from robot_io.errors import DeviceError, DeviceUnreachable
 from robot_io.ipc.arm_record import ARM_RECORD_BYTES, unpack_arm_record
 from robot_io.ipc.process import fresh_interpreter
@@ -139,6 +140,14 @@ class Ur10(DriverBase):
         self._drained = 0
         self._first = NO_ARM
         self._exit_code: int | None = None
+
+    @classmethod
+    def from_rig(cls, address: str, options: Mapping[str, Any]) -> Self:
+        """Return the arm at a rig's host; `options` has how it is held and where, and no others."""
+        left = dict(options)
+        shared = {name: left.pop(name) for name in ("hold", "held_pose_rad", "held_pose_tolerance_rad") if name in left}
+        no_more_options("ur", left)
+        return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
         """Start the arm's process and wait until it has published (5 s, servo 8 s). Raises DeviceError.

@@ -61,6 +61,7 @@ def main() -> int:
         core.fold,
         first_state(job.saved_tare),
         rate_hz=rig.loop.rate_hz,
+        sensor_rate_hz=rig.ft.declared.rate_hz,
         sensor=sensor,
         arm=arm,
         base=base,
