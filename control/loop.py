@@ -255,7 +255,7 @@ def ft_input(
             for s in readings
         ),
         int(health.state),
-        counters["packets_ok"],
+        counters.get("packets_ok", 0),
         counters.get("crc_fail", 0),
         counters.get("junk_bytes", 0),
     )

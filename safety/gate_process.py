@@ -18,6 +18,7 @@ import msgspec
 from msgspec.structs import replace
 
 from robot_io.clock import NS_PER_MS, monotonic_ns
+from robot_io.driver import Base
 from robot_io.errors import PushError
 from robot_io.ipc.base_record import BASE_RECORD_BYTES, pack_base_record
 from robot_io.ipc.event_loop import EventLoop
@@ -26,6 +27,7 @@ from robot_io.ipc.process import lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.record import SharedRecord
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
+from robot_io.kinds import find_kind
 from robot_io.log.gate_log import GateLog
 from robot_io.messages import (
     BaseFeed,
@@ -38,7 +40,6 @@ from robot_io.messages import (
     SliderPose,
     Stamped,
 )
-from robot_io.ridgeback.driver import Ridgeback
 from robot_io.rig.config import BaseConfig, FramesConfig
 from safety import gate
 from safety.gate import GateLimits, GateState, Latch
@@ -56,6 +57,8 @@ class GateJob(msgspec.Struct, frozen=True):
 
     base: BaseConfig
     frames: FramesConfig
+    kind_folder: str
+    """Where else the module of the base's kind may be."""
     limits: GateLimits
     control_fd: int
     record_fd: int
@@ -68,7 +71,7 @@ class GateJob(msgspec.Struct, frozen=True):
 class GateProcess:
     """The impure shell around `safety.gate`."""
 
-    def __init__(self, job: GateJob, base: Ridgeback, status: StatusPipe) -> None:
+    def __init__(self, job: GateJob, base: Base, status: StatusPipe) -> None:
         self._limits = job.limits
         self._base = base
         self._status = status
@@ -236,11 +239,14 @@ def main() -> int:
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=GateJob)
     status = StatusPipe(job.status_fd)
     try:
-        base = Ridgeback(
+        base: Base = find_kind("base", job.base.kind, job.kind_folder).from_rig(
             job.base.url,
-            topics=job.base.topics,
-            pose_source=job.base.pose_source,
-            base_from_marker=job.frames.base_from_marker,
+            {
+                "topics": job.base.topics,
+                "pose_source": job.base.pose_source,
+                "base_from_marker": job.frames.base_from_marker,
+                **job.base.options,
+            },
         )
         info = base.open()
         base.start()

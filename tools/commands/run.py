@@ -14,7 +14,7 @@ from tools.places import run_dir, saved_tare
 from tools.places.saved_tare import SavedTare
 from tools.places.state_dir import RigLock
 from tools.report.process import ReportProcess
-from tools.rig import devices_at, resolve_rig
+from tools.rig import devices_at, folder_of, resolve_rig
 from tools.run.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
@@ -137,7 +137,7 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Saved
     try:
         from tools.run.launcher import Launcher
 
-        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig))
+        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
         figures = launcher.run()
     except BaseException:
         if launcher is None or not launcher.began:

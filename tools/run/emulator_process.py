@@ -24,7 +24,7 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import rig_from_toml
 from sim_backend.world.world import World
 from tools.log.world_log import into
-from tools.run.emulators import OPENERS, endpoint
+from tools.run.emulators import Emulator, address_of, open_emulator
 from tools.run.jobs import EmulatorJob
 
 PRIORITY = 70
@@ -74,27 +74,32 @@ def main() -> int:
     rig = rig_from_toml(job.rig_toml)
     loop = EventLoop()
     ring = Ring(job.ring_fd)
-    opened = []
+    opened: dict[str, Emulator] = {}
     try:
         world = World(rig, job.seed, monotonic_ns(), into(ring.push))
-        opened = [OPENERS[device](loop, world, rig) for device in job.devices]
+        for device in job.devices:
+            opened[device] = open_emulator(loop, world, rig, device, job.kind_folder)
     except PushError as error:
-        for emulator in opened:
+        for emulator in opened.values():
             emulator.close()
         status.error(error)
         return error.exit_code
     Ending(loop, world)
-    status.say("ready", endpoints=[endpoint(emulator) for emulator in opened], realtime=try_realtime(PRIORITY))
+    status.say(
+        "ready",
+        addresses={device: address_of(emulator) for device, emulator in opened.items()},
+        realtime=try_realtime(PRIORITY),
+    )
     gc.collect()
     gc.freeze()
     lock_memory()
     loop.run()
-    for emulator in opened:
+    for emulator in opened.values():
         emulator.close()
     status.say(
         "finished",
         world_stalls=world.stalls,
-        counters={endpoint_["device"]: emulator.counters for emulator in opened for endpoint_ in [endpoint(emulator)]},
+        counters={device: emulator.counters for device, emulator in opened.items()},
     )
     return 0
 

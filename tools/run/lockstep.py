@@ -15,11 +15,12 @@ from msgspec.structs import replace
 
 from control.loop import ft_input
 from control.run_notes import RunNotes, outcome
-from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, VirtualClock
+from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
 from robot_io.messages import ArmRecord, BaseOdometry, BasePose, BaseRecord, BaseReport
 from robot_io.rig.config import RigConfig
+from robot_io.rig.declared import FT300_FACTS
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety import gate
 from safety.gate import GateLimits, GateState
@@ -28,6 +29,7 @@ from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
+from tools.kinds import is_shipped, name_of
 from tools.log.run_log import RunLog
 from tools.log.world_log import into
 from tools.places.saved_tare import SavedTare
@@ -69,10 +71,8 @@ class Lockstep:
         self._clock = VirtualClock(START_NS)
         self._period_ns = round(NS_PER_S / rig.loop.rate_hz)
         self.world = World(rig, seed, START_NS, into(push))
-        sensor, world = rig.world.sensor, rig.world
-        self._ft = SimFt300(
-            self.world, self._clock, rate_hz=sensor.rate_hz, phase=sensor.phase, latency_ms=sensor.latency_ms
-        )
+        world = rig.world
+        self._ft = simulated_sensor(rig, self.world, self._clock)
         self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_rate_hz, phase=world.arm_phase)
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
@@ -101,8 +101,11 @@ class Lockstep:
             if output.finished or now_ns > MOST_SECONDS * NS_PER_S:
                 break
             tick += 1
-        counters = {"ft300": self._ft.health().counters, "ur10": {"packets": inp.arm.packets}}
-        counters["ridgeback"] = self._base.health().counters
+        counters = {
+            name_of(self.rig.ft.kind): self._ft.health().counters,
+            name_of(self.rig.arm.kind): {"packets": inp.arm.packets},
+            name_of(self.rig.base.kind): self._base.health().counters,
+        }
         for device in devices:
             device.stop()
             device.close()
@@ -187,6 +190,18 @@ def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> Ru
     """Open the log of a lockstep run; its facts name nothing that differs from run to run."""
     facts = run_facts("sim", seed, in_contact=in_contact)
     return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
+
+
+def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:
+    """Return the sensor of level sim: an FT 300, or any other kind by what it declares."""
+    model, facts = rig.world.sensor, rig.ft.declared
+    if is_shipped("ft", rig.ft.kind):
+        return SimFt300(world, clock, rate_hz=model.rate_hz, phase=model.phase, latency_ms=model.latency_ms)
+    # Never exactly a multiple of the loop's rate, or every run would test one frozen phase.
+    rate_hz = facts.rate_hz * model.rate_hz / FT300_FACTS.rate_hz
+    return SimFt300(
+        world, clock, rate_hz=rate_hz, phase=model.phase, latency_ms=0, resolution=facts.resolution, limit=facts.range
+    )
 
 
 class WallPace:

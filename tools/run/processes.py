@@ -46,13 +46,13 @@ from tools.run.run_facts import level_of, run_facts
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes of a recorder that does not drain."""
-DEVICE_NAMES = {"ft": "ft300", "arm": "ur10", "base": "ridgeback"}
 
 
 class Processes:
     """Starts the processes of one run, by `start_emulators` and `start_the_rest`; `children` has them by name.
 
-    saved: the tare of a run that starts in contact. log: where the recorder writes. on_spawn: called with each
+    saved: the tare of a run that starts in contact. log: where the recorder writes.
+    kind_folder: where else modules of the rig's kinds may be. on_spawn: called with each
     child as soon as it is there.
     """
 
@@ -63,12 +63,14 @@ class Processes:
         seed: int,
         saved: SavedTare | None,
         log: Path,
+        kind_folder: str,
         on_spawn: Callable[[Child], None],
     ) -> None:
         self._rig = rig
         self._seed = seed
         self._saved = saved
         self._log = log
+        self._kind_folder = kind_folder
         self._on_spawn = on_spawn
         self._offset_ns = wall_offset_ns()
         self._rings = {name: Ring.create(f"{name}-log", size) for name, size in RING_BYTES.items()}
@@ -83,11 +85,11 @@ class Processes:
 
     def start_emulators(self) -> list[str]:
         """Start the world and the wire servers of all devices at level emulated; return the name of the process."""
-        emulated = tuple(DEVICE_NAMES[device] for device in devices_at(self._rig, "emulated"))
+        emulated = tuple(devices_at(self._rig, "emulated"))
         if not emulated:
             return []
         ring_fd, alive_fd = self._rings["world"].fd, self._alive["world"][1]
-        job = EmulatorJob(rig_to_toml(self._rig), self._seed, emulated, os.getpid(), ring_fd, -1)
+        job = EmulatorJob(rig_to_toml(self._rig), self._kind_folder, self._seed, emulated, os.getpid(), ring_fd, -1)
         self._spawn("emulators", "tools.run.emulator_process", job, [ring_fd, alive_fd])
         return ["emulators"]
 
@@ -142,13 +144,13 @@ class Processes:
         rig = self._rig
         emulators = self.children.get("emulators")
         ready = (emulators.ready if emulators else None) or {}
-        for found in ready.get("endpoints", []):
-            if found["device"] == "ft300":
-                rig = replace(rig, ft=replace(rig.ft, port=found["port"]))
-            elif found["device"] == "ur10":
-                rig = replace(rig, arm=replace(rig.arm, host=found["host"]))
-            else:
-                rig = replace(rig, base=replace(rig.base, url=found["url"]))
+        addresses = ready.get("addresses", {})
+        if "ft" in addresses:
+            rig = replace(rig, ft=replace(rig.ft, port=addresses["ft"]))
+        if "arm" in addresses:
+            rig = replace(rig, arm=replace(rig.arm, host=addresses["arm"]))
+        if "base" in addresses:
+            rig = replace(rig, base=replace(rig.base, url=addresses["base"]))
         return rig
 
     def _start_recorder(self, config_text: str) -> None:
@@ -162,7 +164,9 @@ class Processes:
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
         limits = GateLimits.of(SafetySettings.of(rig))
         ring_fd = self._rings["gate"].fd
-        job = GateJob(rig.base, rig.frames, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns)
+        job = GateJob(
+            rig.base, rig.frames, self._kind_folder, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns
+        )
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
@@ -186,7 +190,7 @@ class Processes:
         pidfds = [os.pidfd_open(self.children[name].pid) for name in ("gate", "arm", "recorder")]
         job = ControlJob(
             rig_to_toml(rig),
-            rig.ft.port,
+            self._kind_folder,
             self._saved,
             os.getpid(),
             gate_fd,
