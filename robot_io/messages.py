@@ -65,17 +65,31 @@ class Pose2D(msgspec.Struct, frozen=True, gc=False):
 Joints = tuple[float, float, float, float, float, float]
 
 
+class ArmState(IntEnum):
+    """What an arm's driver makes of its controller's own modes and bits."""
+
+    UNKNOWN = 0
+    HOLDING = 1
+    """Powered, brakes released, standing where it is."""
+    MOVING = 2
+    """It moves, or may be moved by hand."""
+    PROTECTIVE_STOP = 3
+    """Stopped by its own safety functions, or by a safeguard."""
+    EMERGENCY_STOP = 4
+    OFF = 5
+    """Powered off, booting, or with brakes on: as a whole or at one joint."""
+    FOREIGN_PROGRAM = 6
+    """A program that is not ours is running, or paused, and may move it."""
+
+
 class JointState(msgspec.Struct, frozen=True, gc=False):
-    """State of the arm: rad, rad/s, and the controller's own mode numbers (UR RTDE guide, CB3)."""
+    """State of the arm: rad, rad/s, an `ArmState`, and the time of its controller (s)."""
 
     position: Joints
     velocity: Joints
-    robot_mode: int
-    safety_mode: int
-    safety_bits: int
-    robot_status_bits: int
-    runtime_state: int
-    speed_scaling: float
+    state: int
+    device_state: int
+    """The controller's own modes, packed by its driver: for the log and its maker's manual, judged by nobody."""
     controller_time_s: float
 
 
@@ -181,9 +195,7 @@ class ArmRecord(msgspec.Struct, frozen=True, gc=False):
     """Newest state of the arm: joints (rad, rad/s), times in CLOCK_MONOTONIC ns, 0 where there is none yet."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/ArmRecord"
-    joints: JointState = JointState(ZERO_JOINTS, ZERO_JOINTS, -1, 0, 0, 0, 0, 0.0, 0.0)
-    joint_modes: tuple[int, int, int, int, int, int] = (0, 0, 0, 0, 0, 0)
-    """Mode of each joint (253: running)."""
+    joints: JointState = JointState(ZERO_JOINTS, ZERO_JOINTS, ArmState.UNKNOWN, 0, 0.0)
     packets: int = 0
     """How many packets of the controller were seen; the sequence number of `joints`."""
     published_ns: int = 0

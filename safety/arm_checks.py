@@ -6,7 +6,7 @@ import math
 
 from msgspec.structs import replace
 
-from robot_io.messages import LinkState
+from robot_io.messages import ArmState, LinkState
 from robot_io.tick import ControlState, SafetyState, TickInput
 from safety.settings import SafetySettings
 
@@ -16,21 +16,14 @@ STALE_STOP_NS = 100_000_000
 MAX_JOINT_SPEED_RAD_PER_S = 0.02
 JOINT_SPEED_PACKETS = 2
 
-ROBOT_MODE_RUNNING = 7
-"""UR RTDE guide: robot_mode."""
-RUNTIME_STOPPED = 1
-"""UR RTDE guide: runtime_state."""
-JOINT_MODE_RUNNING = 253
-NORMAL_OR_REDUCED = 0b11
-SAFETY_NORMAL, SAFETY_REDUCED = 1, 2
-SAFETY_EMERGENCY = (6, 7)
-"""UR RTDE guide: safety_mode, which says the same as the bits and is believed as well."""
-EMERGENCY = (1 << 5) | (1 << 6) | (1 << 7)
-ANY_STOP = 0b11111111100
-"""UR RTDE guide: safety_status_bits, bits 2 to 10."""
-TEACH_BUTTON = 1 << 2
-POWER_ON = 1
-"""UR RTDE guide: robot_status_bits."""
+FAULT_OF_STATE: dict[int, str] = {
+    ArmState.EMERGENCY_STOP: "F23",
+    ArmState.PROTECTIVE_STOP: "F22",
+    ArmState.OFF: "F27",
+    ArmState.MOVING: "F27",
+    ArmState.UNKNOWN: "F27",
+    ArmState.FOREIGN_PROGRAM: "F28",
+}
 
 
 def check(
@@ -66,23 +59,14 @@ def check(
         run = run + 1 if max(map(abs, joints.velocity)) > MAX_JOINT_SPEED_RAD_PER_S else 0
     if run >= JOINT_SPEED_PACKETS:
         faults.append("F21")
-    faults += _of_modes(settings, inp)
+    faults += _of_state(settings, inp)
     return replace(state, arm_packets=arm.packets, arm_velocity_run=run), faults
 
 
-def _of_modes(settings: SafetySettings, inp: TickInput) -> list[str]:
-    joints = inp.arm.joints
-    bits = joints.safety_bits
-    if bits & EMERGENCY or joints.safety_mode in SAFETY_EMERGENCY:
-        return ["F23"]
-    if bits & ANY_STOP or not bits & NORMAL_OR_REDUCED or joints.safety_mode not in (SAFETY_NORMAL, SAFETY_REDUCED):
-        return ["F22"]
-    status = joints.robot_status_bits
-    running = joints.robot_mode == ROBOT_MODE_RUNNING and status & POWER_ON and not status & TEACH_BUTTON
-    if not running or any(mode != JOINT_MODE_RUNNING for mode in inp.arm.joint_modes):
-        return ["F27"]
-    if joints.runtime_state != RUNTIME_STOPPED and not settings.servo:
-        return ["F28"]
+def _of_state(settings: SafetySettings, inp: TickInput) -> list[str]:
+    state = inp.arm.joints.state
+    if state != ArmState.HOLDING:  # a number that is no ArmState as well
+        return [FAULT_OF_STATE.get(state, "F27")]
     if settings.servo and not inp.arm.servo:
         return ["F20-stop"]
     return []

@@ -115,9 +115,7 @@ class ArmProcess:
         assert reader.joints is not None, "the loop starts after the first packets"
         self._published_ns = now_ns
         servo = self._hold is not None and link == LinkState.UP and error == ArmError.NONE
-        record = ArmRecord(
-            reader.joints, reader.joint_modes, reader.packets, now_ns, reader.changed_ns, link, error, servo, self._pid
-        )
+        record = ArmRecord(reader.joints, reader.packets, now_ns, reader.changed_ns, link, error, servo, self._pid)
         self._record.publish(pack_arm_record(record))
 
 

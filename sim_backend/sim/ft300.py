@@ -1,7 +1,8 @@
 """The force-torque sensor of level `sim`: the driver contract over a virtual clock, without a byte.
 
 Like a real one (an FT 300 unless told otherwise) it samples on its own grid, counts in steps, and delivers each
-sample when its last byte would have been read. Not modelled: garbled packets, the adapter's bunching, opening and closing times.
+sample when its last byte would have been read. Not modelled: garbled packets, the adapter's bunching, opening and
+closing times.
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ class ClosedLoop:
             self._odometry = (truth.twist, now_ns, self._odometry[2] + 1)
             self.gate = gate.on_speed(self._gate_limits, self.gate, truth.twist)
         count = self.tick + 1
-        joints = JointState(self.rig.arm.held_pose_rad, (0.0,) * 6, 7, 1, 1, 1, 1, 1.0, self.tick * 0.01)
+        joints = JointState(self.rig.arm.held_pose_rad, (0.0,) * 6, 1, 0, self.tick * 0.01)
         operator, self.operator = self.operator, Operator.NONE
         return TickInput(
             self.tick,
@@ -104,7 +104,7 @@ class ClosedLoop:
             int(operator),
             HostInput(0, 0, True, True, True, False, 0),
             FtInput(readings, LINK_UP, self._arrived, 0, 0),
-            ArmRecord(joints, (253,) * 6, count, now_ns, now_ns, LINK_UP),
+            ArmRecord(joints, count, now_ns, now_ns, LINK_UP),
             BaseRecord(
                 pose=truth.pose,
                 pose_valid=True,

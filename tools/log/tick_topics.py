@@ -29,7 +29,7 @@ from robot_io.log.ros_messages import (
     ros_time,
     yaw_quaternion,
 )
-from robot_io.messages import BodyTwist, LinkState
+from robot_io.messages import ArmState, BodyTwist, LinkState
 from robot_io.tick import ControlTick, FtReading, Mode
 from safety.faults import FAULTS
 
@@ -44,6 +44,7 @@ JOINT_NAMES = (
 )
 _NO_TORQUE = Vector3(math.nan, math.nan, math.nan)
 _MODE_NAMES = {int(mode): mode.name for mode in Mode}
+_ARM_STATES = {int(state): state.name.lower() for state in ArmState}
 _INFO, _WARN, _ERROR = 20, 30, 40
 
 
@@ -152,6 +153,10 @@ def _mode(number: int) -> str:
     return _MODE_NAMES.get(number, str(number))
 
 
+def _arm_state(number: int) -> str:
+    return _ARM_STATES.get(number, str(number))
+
+
 def _diagnostics(tick: ControlTick, header: Header) -> DiagnosticArray:
     ft, arm, base, host = tick.input.ft, tick.input.arm, tick.input.base, tick.input.host
     arm_up = arm.link == LinkState.UP and not arm.error
@@ -160,7 +165,7 @@ def _diagnostics(tick: ControlTick, header: Header) -> DiagnosticArray:
         header,
         (
             _status("ft300", ft.link == LinkState.UP, packets=ft.packets_ok, crc_fail=ft.crc_fail, junk=ft.junk_bytes),
-            _status("ur10", arm_up, packets=arm.packets, error=arm.error, robot_mode=arm.joints.robot_mode),
+            _status("ur10", arm_up, packets=arm.packets, error=arm.error, state=_arm_state(arm.joints.state)),
             _status(
                 "ridgeback",
                 base_up and not base.status.stop_engaged,

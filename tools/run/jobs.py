@@ -26,6 +26,16 @@ class ControlJob(msgspec.Struct, frozen=True):
     recorder_pidfd: int
 
 
+class ArmKindJob(msgspec.Struct, frozen=True):
+    """For `tools.run.arm_process`."""
+
+    rig_toml: str
+    kind_folder: str
+    launcher_pid: int
+    record_fd: int
+    status_fd: int
+
+
 class EmulatorJob(msgspec.Struct, frozen=True):
     """For `tools.run.emulator_process`."""
 

@@ -37,9 +37,10 @@ from robot_io.ur10.driver import spawn_child
 from safety.gate import GateLimits
 from safety.gate_process import GateJob
 from safety.settings import SafetySettings
+from tools.kinds import is_shipped
 from tools.places.saved_tare import SavedTare
 from tools.rig import devices_at
-from tools.run.jobs import ControlJob, EmulatorJob
+from tools.run.jobs import ArmKindJob, ControlJob, EmulatorJob
 from tools.run.recorder import Job as RecorderJob
 from tools.run.recorder import RingSource
 from tools.run.run_facts import level_of, run_facts
@@ -170,6 +171,10 @@ class Processes:
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
+        if not is_shipped("arm", rig.arm.kind):
+            job = ArmKindJob(rig_to_toml(rig), self._kind_folder, os.getpid(), record_fd, -1)
+            self._spawn("arm", "tools.run.arm_process", job, [record_fd])
+            return
         status = os.pipe()
         stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it
         process = spawn_child(

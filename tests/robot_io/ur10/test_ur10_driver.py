@@ -12,7 +12,7 @@ import pytest
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceProtocolError, DeviceUnreachable
 from robot_io.ipc.arm_record import ARM_RECORD_BYTES
 from robot_io.ipc.record import SharedRecord
-from robot_io.messages import LinkState
+from robot_io.messages import ArmState, LinkState
 from robot_io.ur10.driver import ArmLink, Ur10, end_child, spawn_child
 from robot_io.ur10.job import parse_status
 from tests.wire.ur_process import EmulatorProcess, fresh_address, wait_until
@@ -55,9 +55,8 @@ def test_samples_carry_joints_modes_stamps_and_rising_numbers(arm) -> None:
     wait_until(ten, "ten samples")
     joints = samples[-1].value
     assert joints.position == HELD
-    assert (joints.robot_mode, joints.safety_mode, joints.safety_bits) == (7, 1, 1)
-    assert (joints.robot_status_bits, joints.runtime_state, joints.speed_scaling) == (1, 1, 1.0)
-    assert arm.read().joint_modes == (253,) * 6
+    assert joints.state == ArmState.HOLDING
+    assert joints.device_state == 0x0001_01_01_01_07  # safety bits; status, runtime, safety and robot mode
     for before, after in itertools.pairwise(samples):
         assert after.seq > before.seq
         assert after.received_ns > before.received_ns
@@ -94,7 +93,7 @@ def test_monitor_leaves_a_playing_program_alone(robot) -> None:
     robot.call("play_other_program")
     wait_until(lambda: robot.get("controller.runtime_state") == 2, "it plays")
     with Ur10(robot.host) as arm:
-        assert arm.read().joints.runtime_state == 2
+        assert arm.read().joints.state == ArmState.FOREIGN_PROGRAM
     assert robot.get("controller.runtime_state") == 2
 
 

@@ -1,0 +1,84 @@
+"""An arm of somebody else in a run: `python -m tools.run.arm_process` (job on stdin). Publishes one shared record.
+
+Its driver may block or crash without touching the loop, which only sees a record that grows old.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+
+import msgspec
+
+from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
+from robot_io.driver import Driver
+from robot_io.errors import PushError
+from robot_io.ipc.arm_record import ARM_RECORD_BYTES, pack_arm_record
+from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.status import StatusPipe
+from robot_io.kinds import find_kind
+from robot_io.messages import ArmRecord, JointState, LinkState
+from robot_io.rig.config import rig_from_toml
+from tools.run.jobs import ArmKindJob
+
+PRIORITY = 81
+PERIOD_NS = 4 * NS_PER_MS
+"""How often the driver is drained, and a record published."""
+
+
+def main() -> int:
+    """Serve until SIGTERM; the exit code is that of the error when the arm could not be opened."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=ArmKindJob)
+    die_with_parent(job.launcher_pid)
+    set_timer_slack_1ns()
+    status = StatusPipe(job.status_fd)
+    arm = rig_from_toml(job.rig_toml).arm
+    shared = {
+        "hold": arm.hold,
+        "held_pose_rad": arm.held_pose_rad,
+        "held_pose_tolerance_rad": arm.held_pose_tolerance_rad,
+    }
+    asked: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: asked.append(number))
+    try:
+        driver: Driver[JointState] = find_kind("arm", arm.kind, job.kind_folder).from_rig(
+            arm.host, shared | arm.options
+        )
+        info = driver.open()
+        driver.start()
+    except PushError as error:
+        status.error(error)
+        return error.exit_code
+    status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
+    lock_memory()
+    record = SharedRecord(job.record_fd, ARM_RECORD_BYTES)
+    newest = ArmRecord(child_pid=os.getpid())
+    try:
+        while not asked and newest.link != LinkState.LOST:
+            newest = publish(driver, record, newest, servo=arm.hold == "servo")
+            time.sleep(PERIOD_NS / NS_PER_S)
+    finally:
+        driver.stop()
+        driver.close()
+    return 0
+
+
+def publish(driver: Driver[JointState], record: SharedRecord, before: ArmRecord, *, servo: bool) -> ArmRecord:
+    """Publish the newest state of the driver, also when there is no new one; return it."""
+    samples, link = driver.drain(), driver.health().state
+    newest = before
+    if samples:
+        sample = samples[-1]
+        newest = msgspec.structs.replace(before, joints=sample.value, packets=sample.seq, changed_ns=sample.received_ns)
+    holds = servo and link == LinkState.UP
+    newest = msgspec.structs.replace(newest, link=int(link), servo=holds, published_ns=monotonic_ns())
+    record.publish(pack_arm_record(newest))
+    return newest
+
+
+if __name__ == "__main__":
+    sys.exit(main())
