@@ -93,10 +93,8 @@ def _choices(kind: Any) -> tuple[Any, ...]:
 
 
 def _finite(value: Any) -> bool:
-    if isinstance(value, tuple | list):
+    if isinstance(value, tuple):
         return all(_finite(item) for item in value)
-    if isinstance(value, dict):
-        return all(_finite(item) for item in value.values())
     return not isinstance(value, float) or math.isfinite(value)
 
 
