@@ -5,6 +5,7 @@ Its code runs here only, and in the processes that build its devices; never in t
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from typing import Any
@@ -88,13 +89,16 @@ def told_by(device: str, found: type[Any], kind: str) -> Told:
     if device != "ft":
         return Told(emulated)
     try:
-        return Told(emulated, msgspec.convert(msgspec.to_builtins(found.facts), SensorFacts))
+        facts = msgspec.convert(msgspec.to_builtins(found.facts), SensorFacts)
     except (msgspec.ValidationError, TypeError, ValueError) as error:
         raise ConfigError(
             f"the `facts` of `{kind}` are not SensorFacts: {error}",
             where=f"{device}.kind",
             do="docs/add-a-device.md shows what a sensor declares",
         ) from None
+    if not all(map(math.isfinite, (*facts.range, facts.rate_hz, *facts.resolution, *facts.noise))):
+        raise ConfigError(f"the `facts` of `{kind}` hold a number that is not finite", where=f"{device}.kind")
+    return Told(emulated, facts)
 
 
 def main() -> int:
