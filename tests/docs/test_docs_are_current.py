@@ -19,6 +19,7 @@ import pytest
 from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import blame_the_host
 from tools.cli import COMMANDS
+from tools.dev.drivers_page import page
 from tools.dev.fault_table import table
 from tools.dev.rig_reference import reference
 from tools.rig import resolve_rig
@@ -34,6 +35,10 @@ def test_rig_reference_is_current():
     assert (ROOT / "docs/rig-files.md").read_text() == reference(), (
         "python -m tools.dev.rig_reference > docs/rig-files.md"
     )
+
+
+def test_drivers_page_is_current():
+    assert (ROOT / "docs/drivers.md").read_text() == page(), "python -m tools.dev.drivers_page > docs/drivers.md"
 
 
 def test_fault_table_is_current():

@@ -5,7 +5,6 @@ python -m tools.dev.rig_reference > docs/rig-files.md
 
 from __future__ import annotations
 
-import ast
 import inspect
 import sys
 from types import UnionType
@@ -16,6 +15,7 @@ from msgspec import Meta
 
 from robot_io.rig import config, topics, world
 from robot_io.rig.config import RigConfig
+from tools.dev.notes import notes_of
 
 INTRO = """# Rig files
 
@@ -40,7 +40,7 @@ the nearest known one. The program's own ceilings (`safety/limits.py`) may only 
 def reference() -> str:
     """Return the page."""
     parts = [INTRO]
-    notes = _field_notes()
+    notes = notes_of(config, topics, world)
     for title, table in _tables(RigConfig, ""):
         parts.append(f"\n## {f'[{title}]' if title else 'At the top'}\n")
         doc = inspect.cleandoc(table.__doc__ or "")
@@ -94,23 +94,6 @@ def _default(field: msgspec.structs.FieldInfo) -> str:
     if isinstance(field.default, tuple):
         return f"`{list(field.default)}`"
     return f"`{field.default!r}`".replace("'", '"')
-
-
-def _field_notes() -> dict[tuple[str, str], str]:
-    """Return the text below each field of the source, by (class, field)."""
-    notes = {}
-    for node in (node for module in (config, topics, world) for node in ast.parse(inspect.getsource(module)).body):
-        if not isinstance(node, ast.ClassDef):
-            continue
-        for field, text in zip(node.body, node.body[1:], strict=False):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant)
-            ):
-                notes[node.name, field.target.id] = str(text.value.value)
-    return notes
 
 
 if __name__ == "__main__":
