@@ -43,6 +43,12 @@ class CdrType(Generic[MessageT]):
         self.schema_text = schema_text(shape)
         self._layout = Layout(shape)
 
+    @property
+    def fixed_bytes(self) -> int | None:
+        """Size of every payload, or None when it depends on the values (strings, sequences)."""
+        fixed = self._layout.fixed_bytes
+        return None if fixed is None else HEADER_BYTES + fixed
+
     def encode(self, value: MessageT) -> bytes:
         """Return the payload of `value`. Raises ValueError when a value does not fit its field."""
         out = bytearray(ENCAPSULATION)

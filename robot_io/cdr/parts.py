@@ -52,6 +52,14 @@ class Layout:
         self._build: Build | None = None
         self._write: Write | None = None
 
+    @property
+    def fixed_bytes(self) -> int | None:
+        """Size of every message without its header, or None when it depends on the values."""
+        match self._parts:
+            case [_Run() as run]:
+                return run.bytes_at_start
+        return None
+
     def write(self, value: Any, out: bytearray) -> None:
         """Append `value` to `out`, which starts with the encapsulation header."""
         if self._write is None:
@@ -88,6 +96,7 @@ class _Run(_Part):
     def __init__(self, items: list[tuple[str, Scalar, int | None]]) -> None:
         self._paths = [(path, count) for path, _, count in items]
         self._packers = [struct.Struct(_format(items, start)) for start in range(8)]
+        self.bytes_at_start = self._packers[0].size
         # Only these bytes can differ from what would be written again: padding, and bools.
         self._loose = [
             "x" in packer.format or any(scalar.ros == "bool" for _, scalar, _ in items) for packer in self._packers

@@ -54,10 +54,10 @@ class GateLog:
         """Log what really went out to the base."""
         self._push(Kind.GATE_SENT, now_ns, TwistStamped(self._header(now_ns, BASE_FRAME), _twist(twist)))
 
-    def latched(self, now_ns: int, seq: int, tick: int, verdict: int, text: str, fault: str) -> None:
+    def latched(self, now_ns: int, seq: int, tick: int, latch: int, text: str, fault: str) -> None:
         """Log why the gate latched; `fault` names the row of the fault table ("" for the normal end)."""
         header = self._header(now_ns, BASE_FRAME)
-        self._push(Kind.GATE_DECISION, now_ns, GateDecision(header, seq, tick, verdict, True, text))
+        self._push(Kind.GATE_DECISION, now_ns, GateDecision(header, seq, tick, latch, True, text))
         if fault:
             stop = int(Mode.STOP)
             self._push(

@@ -20,7 +20,6 @@ import msgspec
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable, PushError
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES, pack_arm_record
 from robot_io.ipc.process import (
     die_with_parent,
     forbid_new_descriptors,
@@ -29,7 +28,7 @@ from robot_io.ipc.process import (
     starting_threads_at,
     try_realtime,
 )
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import ArmError, ArmRecord, LinkState
 from robot_io.ur10.job import ArmJob, error_line, ready_line
 from robot_io.ur10.preflight import preflight
@@ -70,7 +69,7 @@ class ArmProcess:
     """The loop: look for a packet, publish, and in servo mode command the target."""
 
     def __init__(
-        self, job: ArmJob, record: SharedRecord, reader: ArmReader, hold: ActiveHold | None, ending: Ending
+        self, job: ArmJob, record: TypedRecord[ArmRecord], reader: ArmReader, hold: ActiveHold | None, ending: Ending
     ) -> None:
         self._job = job
         self._record = record
@@ -118,7 +117,7 @@ class ArmProcess:
         record = ArmRecord(
             reader.joints, reader.joint_modes, reader.packets, now_ns, reader.changed_ns, link, error, servo, self._pid
         )
-        self._record.publish(pack_arm_record(record))
+        self._record.publish(record)
 
 
 def _sleep_until_next(deadline_ns: int) -> int:
@@ -131,7 +130,7 @@ def _sleep_until_next(deadline_ns: int) -> int:
     return deadline_ns
 
 
-def hold_arm(job: ArmJob, record: SharedRecord) -> NoReturn:
+def hold_arm(job: ArmJob, record: TypedRecord[ArmRecord]) -> NoReturn:
     """Connect, report ready, publish until told to end; then end this process. Raises DeviceError."""
     info = preflight(job.host)
     threads_priority = RECEIVER_PRIORITY if job.realtime_priority > 0 else 0
@@ -174,7 +173,7 @@ def main() -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the launcher's to handle
     set_timer_slack_1ns()
     try:
-        hold_arm(job, SharedRecord(job.record_fd, ARM_RECORD_BYTES))
+        hold_arm(job, TypedRecord(job.record_fd, ARM_RECORD))
     except PushError as error:
         _report(job, error_line(error))
         # In here: after this block the error lets go of the frames that hold the wheel's objects.

@@ -23,9 +23,8 @@ import msgspec
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.driver import DriverBase
 from robot_io.errors import DeviceError, DeviceUnreachable
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES, unpack_arm_record
 from robot_io.ipc.process import fresh_interpreter
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import (
     NO_ARM,
     ArmError,
@@ -91,10 +90,10 @@ def end_child(child: subprocess.Popen[bytes], within_s: float = STOP_WITHIN_S) -
 
 
 class ArmLink:
-    """The newest record of the arm's process, from a descriptor made by `SharedRecord.create`."""
+    """The newest record of the arm's process, from a descriptor made by `TypedRecord.create`."""
 
     def __init__(self, record_fd: int) -> None:
-        self._record = SharedRecord(record_fd, ARM_RECORD_BYTES)
+        self._record = TypedRecord(record_fd, ARM_RECORD)
         self._count = 0
         self._newest: ArmRecord | None = None
 
@@ -103,8 +102,7 @@ class ArmLink:
         if self._record.count != self._count:
             read = self._record.read()
             if read is not None:
-                self._count = read[0]
-                self._newest = unpack_arm_record(read[1])
+                self._count, self._newest = read
         return self._newest
 
     def close(self) -> None:
@@ -147,7 +145,7 @@ class Ur10(DriverBase):
         """
         if self._child is not None:
             raise DeviceError("the arm is already open", where=self.host)
-        record = SharedRecord.create("arm", ARM_RECORD_BYTES)
+        record = TypedRecord.create("arm", ARM_RECORD)
         listen_fd, status_fd = os.pipe()
         try:
             self._link = ArmLink(record.fd)

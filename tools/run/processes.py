@@ -27,14 +27,11 @@ import msgspec
 from msgspec.structs import replace
 
 from robot_io.clock import wall_offset_ns
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES
-from robot_io.ipc.base_record import BASE_RECORD_BYTES
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.spawn import Child, spawn
 from robot_io.rig.config import RigConfig, rig_to_toml
 from robot_io.ur10.driver import spawn_child
-from safety.gate import GateLimits
 from safety.gate_process import GateJob
 from safety.settings import SafetySettings
 from tools.places.saved_tare import SavedTare
@@ -97,8 +94,8 @@ class Processes:
         config_text: the resolved rig, for the log.
         """
         rig = self._with_endpoints()
-        arm = SharedRecord.create("arm", ARM_RECORD_BYTES)
-        base = SharedRecord.create("base", BASE_RECORD_BYTES)
+        arm = TypedRecord.create("arm", ARM_RECORD)
+        base = TypedRecord.create("base", BASE_RECORD)
         control_end, gate_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         operator_read, self._operator_fd = os.pipe()
         os.set_blocking(self._operator_fd, False)
@@ -114,8 +111,8 @@ class Processes:
             os.close(write_end)
         for ring in self._rings.values():
             ring.close()
-        for record in (arm, base):
-            record.close()
+        arm.close()
+        base.close()
         return ["recorder", "gate", "arm", "control"]
 
     def tell_control(self, key: bytes) -> None:
@@ -160,7 +157,7 @@ class Processes:
         self._spawn("recorder", "tools.run.recorder", job, [*(ring.fd for ring in rings), *alive])
 
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
-        limits = GateLimits.of(SafetySettings.of(rig))
+        limits = SafetySettings.of(rig).envelope
         ring_fd = self._rings["gate"].fd
         job = GateJob(rig.base, rig.frames, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns)
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])

@@ -10,8 +10,7 @@ import time
 import pytest
 
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceProtocolError, DeviceUnreachable
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import LinkState
 from robot_io.ur10.driver import ArmLink, Ur10, end_child, spawn_child
 from robot_io.ur10.job import parse_status
@@ -230,7 +229,7 @@ def test_the_child_dies_with_its_parent(robot) -> None:
 
 
 def test_the_parts_as_the_launcher_uses_them(robot) -> None:
-    record = SharedRecord.create("arm", ARM_RECORD_BYTES)
+    record = TypedRecord.create("arm", ARM_RECORD)
     listen_fd, status_fd = os.pipe()
     child = spawn_child(robot.host, hold="monitor", record_fd=record.fd, status_fd=status_fd)
     os.close(status_fd)
@@ -249,7 +248,7 @@ def test_the_parts_as_the_launcher_uses_them(robot) -> None:
 
 
 def test_a_child_with_no_status_descriptor_and_no_robot_just_ends() -> None:
-    record = SharedRecord.create("arm", ARM_RECORD_BYTES)
+    record = TypedRecord.create("arm", ARM_RECORD)
     child = spawn_child(fresh_address(), hold="monitor", record_fd=record.fd)
     try:
         assert child.wait(10) == 4

@@ -7,8 +7,7 @@ import time
 import pytest
 
 from robot_io.errors import DeviceNotReady
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import ArmError, LinkState
 from robot_io.ur10.driver import Ur10, end_child, spawn_child
 from tests.wire.ur_process import EmulatorProcess, wait_until
@@ -91,7 +90,7 @@ def test_told_to_end_while_it_begins_it_ends_its_script(robot, tmp_path, monkeyp
     """No watchdog is armed yet: a script left behind would play until somebody stops it at the pendant."""
     (tmp_path / "sitecustomize.py").write_text(SLOW_PREPARATION)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    record = SharedRecord.create("arm", ARM_RECORD_BYTES)
+    record = TypedRecord.create("arm", ARM_RECORD)
     child = spawn_child(robot.host, hold="servo", record_fd=record.fd)
     try:
         wait_until(lambda: robot.get("controller.runtime_state") == 2, "the script plays")
