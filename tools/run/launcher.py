@@ -128,7 +128,7 @@ class Launcher:
             elif event.get("event") == "warning":
                 self._live.say(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
-                self._live.say(f"recorder: {event['what']}")
+                self._live.say(f"recorder: {event['error']['what']}")
                 self._processes.tell_control(b"L")
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
@@ -220,7 +220,7 @@ class Launcher:
         for name in ("gate", "emulators", "arm", "recorder"):
             child = self._children.get(name)
             if child is not None and child.errors:
-                self.notes.append(f"{name}: {child.errors[-1].get('what', '')}")
+                self.notes.append(f"{name}: {child.errors[-1].what}")
             elif child is not None and child.process.returncode != 0:
                 self.notes.append(f"the {name} process {child.how_it_ended()}")
         said = self._said("recorder")

@@ -19,7 +19,6 @@ import contextlib
 import os
 import platform
 import socket
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -31,7 +30,8 @@ from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.spawn import Child, spawn
 from robot_io.rig.config import RigConfig, rig_to_toml
-from robot_io.ur10.driver import spawn_child
+from robot_io.ur10.driver import spawn_arm
+from robot_io.ur10.job import ArmJob
 from safety.gate_process import GateJob
 from safety.settings import SafetySettings
 from tools.places.saved_tare import SavedTare
@@ -163,19 +163,8 @@ class Processes:
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
-        status = os.pipe()
-        stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it
-        process = spawn_child(
-            rig.arm.host,
-            hold=rig.arm.hold,
-            record_fd=record_fd,
-            status_fd=status[1],
-            held_pose_rad=rig.arm.held_pose_rad,
-            held_pose_tolerance_rad=rig.arm.held_pose_tolerance_rad,
-            stderr=stderr,
-        )
-        os.close(status[1])
-        self._adopt(Child("arm", process, status[0], stderr))
+        pose, tolerance_rad = rig.arm.held_pose_rad, rig.arm.held_pose_tolerance_rad
+        self._adopt(spawn_arm(ArmJob(rig.arm.host, rig.arm.hold, record_fd, os.getpid(), pose, tolerance_rad)))
 
     def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:
         ring_fd, alive_fd = self._rings["control"].fd, self._alive["control"][1]
