@@ -7,9 +7,9 @@ so that the world can be run again bit for bit.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
+from robot_io.geometry import point_outside, seen_from_frame
 from robot_io.log.world_messages import WorldCommand, WorldStall, WorldStart, WorldState
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.rig.config import RigConfig
@@ -122,9 +122,7 @@ class World:
             self._on_record(self._state())
 
     def _ball_of(self, x: float, y: float, yaw: float) -> tuple[float, float]:
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        reach_x, reach_y = self._reach
-        return x + cos * reach_x - sin * reach_y, y + sin * reach_x + cos * reach_y
+        return point_outside(x, y, yaw, *self._reach)
 
     def _state(self) -> WorldState:
         contact = self._contact
@@ -142,6 +140,4 @@ class World:
 
 
 def _in_base(pose: Pose2D, x_world: float, y_world: float) -> tuple[float, float]:
-    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    dx, dy = x_world - pose.x, y_world - pose.y
-    return cos * dx + sin * dy, cos * dy - sin * dx
+    return seen_from_frame(x_world - pose.x, y_world - pose.y, pose.yaw)

@@ -13,8 +13,8 @@ from pathlib import Path
 import msgspec
 
 from robot_io.errors import UsageError
+from robot_io.messages import Vector6
 from robot_io.rig.config import RigConfig
-from robot_io.tick import Vector6
 from tools.places.state_dir import file_name, state_dir
 
 MAX_AGE_S = 12 * 3600.0
