@@ -10,6 +10,7 @@ from pathlib import Path
 
 from robot_io.errors import UsageError
 from robot_io.rig.config import RigConfig, rig_to_toml
+from tools.places.whole_file import write_whole
 
 MOST_IN_A_SECOND = 1000
 RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
@@ -65,10 +66,4 @@ def write_config(path: Path, rig: RigConfig) -> str:
 
 def write_json(path: Path, value: object) -> None:
     """Write a JSON file whole or not at all."""
-    part = path.with_suffix(".part")
-    try:
-        part.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
+    write_whole(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Message, Metadata
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.clock import NS_PER_S
 from robot_io.errors import LogDamaged, PushError
 from robot_io.geometry import StraightPath, wrap_angle, yaw_from_quaternion
-from robot_io.log.mcap_walk import Grown, walk
+from robot_io.log.mcap_walk import Grown, Topic, walk
 from robot_io.log.messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
 from robot_io.log.ros_messages import POSE_STAMPED
 from robot_io.log.world_messages import STATE_CDR
@@ -92,15 +92,12 @@ def read_run(path: Path, *, grown: Grown | None = None) -> RunData:
     """
     reader = _Reader(path)
     topics: dict[int, str] = {}
-    schemas: dict[int, bytes] = {}
     for item in walk(path, grown=grown):
         if isinstance(item, Message):
             reader.message(topics[item.channel_id], item.log_time, item.data)
-        elif isinstance(item, Channel):
-            topics[item.id] = item.topic
-            reader.channel(item.topic, schemas[item.schema_id])
-        elif isinstance(item, Schema):
-            schemas[item.id] = item.data
+        elif isinstance(item, Topic):
+            topics[item.channel.id] = item.channel.topic
+            reader.channel(item.channel.topic, item.schema.data)
         elif isinstance(item, Attachment) and item.name == "config.toml":
             reader.config(item.data)
         elif isinstance(item, Metadata):

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from robot_io.errors import UsageError
+from tools.places.whole_file import write_whole
 from tools.study.items import Part, Row
 
 STUDY_FILE = "study.json"
@@ -97,10 +98,7 @@ class Store:
 
     def write_bytes(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all."""
-        path = self.out / name
-        part = path.with_name(path.name + ".new")
-        part.write_bytes(content)
-        part.replace(path)
+        write_whole(self.out / name, content)
 
     def _read(self, index: int) -> Part | None:
         path = self.out / "parts" / f"{index:06d}.npz"
