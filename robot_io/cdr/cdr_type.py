@@ -44,10 +44,9 @@ class CdrType(Generic[MessageT]):
         self._layout = Layout(shape)
 
     @property
-    def fixed_bytes(self) -> int | None:
-        """Size of every payload, or None when it depends on the values (strings, sequences)."""
-        fixed = self._layout.fixed_bytes
-        return None if fixed is None else HEADER_BYTES + fixed
+    def fixed_size(self) -> bool:
+        """Whether all payloads have one size: no strings, no sequences."""
+        return self._layout.fixed
 
     def encode(self, value: MessageT) -> bytes:
         """Return the payload of `value`. Raises ValueError when a value does not fit its field."""

@@ -47,18 +47,12 @@ class Layout:
         if run:
             self._parts.append(_Run(run))
         self.min_bytes = sum(part.min_bytes for part in self._parts)
+        self.fixed = all(isinstance(part, _Run) for part in self._parts)
+        """Whether all messages have one size, because none of its parts varies."""
         self._shape = shape
         # Compiled at their first use: most types of a run are never read, most of a log never written.
         self._build: Build | None = None
         self._write: Write | None = None
-
-    @property
-    def fixed_bytes(self) -> int | None:
-        """Size of every message without its header, or None when it depends on the values."""
-        match self._parts:
-            case [_Run() as run]:
-                return run.bytes_at_start
-        return None
 
     def write(self, value: Any, out: bytearray) -> None:
         """Append `value` to `out`, which starts with the encapsulation header."""
@@ -96,7 +90,6 @@ class _Run(_Part):
     def __init__(self, items: list[tuple[str, Scalar, int | None]]) -> None:
         self._paths = [(path, count) for path, _, count in items]
         self._packers = [struct.Struct(_format(items, start)) for start in range(8)]
-        self.bytes_at_start = self._packers[0].size
         # Only these bytes can differ from what would be written again: padding, and bools.
         self._loose = [
             "x" in packer.format or any(scalar.ros == "bool" for _, scalar, _ in items) for packer in self._packers

@@ -87,7 +87,7 @@ class SharedRecord:
 class TypedRecord(Generic[MessageT]):
     """A `SharedRecord` of messages of one type, all encoded in the same number of bytes (CDR).
 
-    Raises TypeError for a type with strings or sequences.
+    Raises TypeError for a type with strings or sequences, or whose fields lack defaults.
     """
 
     def __init__(self, fd: int, message_type: CdrType[MessageT]) -> None:
@@ -128,7 +128,6 @@ def _stride(payload_size: int) -> int:
 
 
 def _fixed_bytes(message_type: CdrType[MessageT]) -> int:
-    size = message_type.fixed_bytes
-    if size is None:
+    if not message_type.fixed_size:
         raise TypeError(f"{message_type.name} has no fixed size")
-    return size
+    return len(message_type.encode(message_type.struct_type()))

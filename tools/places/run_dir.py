@@ -10,7 +10,7 @@ from pathlib import Path
 
 from robot_io.errors import UsageError
 from robot_io.rig.config import RigConfig, rig_to_toml
-from tools.places.whole_file import write_whole
+from tools.places.whole_file import check_writable, write_whole
 
 MOST_IN_A_SECOND = 1000
 RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
@@ -26,9 +26,7 @@ def create(out: str | None, rig_name: str) -> Path:
         if any((path / name).exists() for name in RUN_FILES) and out:
             raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
         path = _made(path, given=bool(out))
-        probe = path / ".writable"
-        probe.touch()
-        probe.unlink()
+        check_writable(path)
     except OSError as error:
         raise UsageError(
             f"the run's folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"

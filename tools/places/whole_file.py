@@ -15,3 +15,10 @@ def write_whole(path: Path, content: bytes) -> None:
     except OSError:
         part.unlink(missing_ok=True)
         raise
+
+
+def check_writable(folder: Path) -> None:
+    """Raise OSError unless files can be made in a folder: better now than when a run is over."""
+    probe = folder / ".writable"
+    probe.touch()
+    probe.unlink()

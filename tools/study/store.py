@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from robot_io.errors import UsageError
-from tools.places.whole_file import write_whole
+from tools.places.whole_file import check_writable, write_whole
 from tools.study.items import Part, Row
 
 STUDY_FILE = "study.json"
@@ -57,9 +57,7 @@ class Store:
             (out / "parts").mkdir(parents=True, exist_ok=True)
             if found is None:
                 self.write_json(STUDY_FILE, {"schema": 1, "study": name, "fingerprint": mark})
-            probe = out / ".writable"
-            probe.touch()
-            probe.unlink()
+            check_writable(out)
         except OSError as error:
             raise UsageError(
                 f"this folder cannot be written: {error.strerror}", where=str(out), do="Give another --out"
