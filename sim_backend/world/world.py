@@ -54,7 +54,7 @@ class World:
         self._sensor = SensorModel(rig, seed)
         self._arm = ArmTruth(rig.arm.held_pose_rad, (0.0,) * 6)
         self._reach = rig.frames.contact_in_base_m[:2]
-        self._ball = self._ball_of(*self._plant.place)
+        self._ball = point_outside(*self._plant.place, *self._reach)
         self._contact = FREE
         self._start_ns = start_ns
         self._steps = 0
@@ -115,14 +115,11 @@ class World:
     def _step(self) -> None:
         self._steps += 1
         self._plant.step_to(self.now_ns)
-        ball = self._ball_of(*self._plant.place)
+        ball = point_outside(*self._plant.place, *self._reach)
         self._contact = self._slider.step(self._ball, ball, GRID_NS * 1e-9)
         self._ball = ball
         if self._steps % STATE_EVERY_STEPS == 0:
             self._on_record(self._state())
-
-    def _ball_of(self, x: float, y: float, yaw: float) -> tuple[float, float]:
-        return point_outside(x, y, yaw, *self._reach)
 
     def _state(self) -> WorldState:
         contact = self._contact
