@@ -101,7 +101,7 @@ class GateProcess:
 
     def _read_control(self) -> None:
         """Take every frame that waits: they are read before any silence is judged."""
-        now_ns = monotonic_ns()  # before reading: a pause of this process makes no frame old
+        began_ns = monotonic_ns()
         frames: list[GateFrame | None] = []
         gone = bool(self._shell.zeros_since_ns)
         while not gone:
@@ -114,7 +114,7 @@ class GateProcess:
             if payload:
                 frames.append(unpack_frame(payload))
             gone = not payload
-        self._shell = self._shell.on_frames(frames, now_ns)
+        self._shell = self._shell.on_frames(frames, began_ns, monotonic_ns())
         if gone and not self._shell.zeros_since_ns:
             self._loop.remove_fd(self._control.fileno())
             self._shell = self._shell.on_control_gone(monotonic_ns())

@@ -3,11 +3,11 @@
 The gate's process and level sim both keep one `GateShell`, hand it what arrived and what the clock says, and carry
 out what it answers; neither decides anything itself. In the order of one turn:
 
-    shell = shell.on_frames(frames, now_ns)          # control's frames, before any silence is judged
+    shell = shell.on_frames(frames, began_ns, now_ns)  # control's frames, before any silence is judged
     shell = shell.on_samples(base.drain())
     shell = shell.on_clock(now_ns, base.health())
-    shell, latching = shell.on_leaving(now_ns)       # log and publish `latching` unless None
-    wanted = shell.due(now_ns)                       # send it unless None, then tell `on_sent`
+    shell, latching = shell.on_leaving(now_ns)         # log and publish `latching` unless None
+    wanted = shell.due(now_ns)                         # send it unless None, then tell `on_sent`
 """
 
 from __future__ import annotations
@@ -69,11 +69,16 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
     zeros_since_ns: int = 0
     """When control was gone; 0 while it is there."""
 
-    def on_frames(self, frames: Sequence[GateFrame | None], now_ns: int) -> GateShell:
-        """Judge the frames that waited (None: nonsense), oldest first; `now_ns` is when their reading began."""
+    def on_frames(self, frames: Sequence[GateFrame | None], began_ns: int, read_ns: int) -> GateShell:
+        """Judge the frames that waited (None: nonsense), oldest first, read from `began_ns` to `read_ns`.
+
+        A pause of the gate in between makes no frame old, and is no silence of control.
+        """
         if not frames:
             return self
-        state = gate.on_frames(self.limits, self.gate, frames, now_ns)
+        state = gate.on_frames(self.limits, self.gate, frames, began_ns)
+        if not state.latch:
+            state = replace(state, frame_ns=read_ns)
         record = replace(self.record, accepted_seq=state.seq, verdict=int(state.latch))
         return replace(self, gate=state, record=record)
 

@@ -110,6 +110,23 @@ def test_a_gate_that_was_frozen_lets_nothing_out_whatever_wakes_it_first(rig, wa
     assert rig.record().latch_cause == Latch.PAUSED
 
 
+def test_a_pause_while_frames_are_read_is_no_silence_of_control(rig, monkeypatch):
+    """It falls between the look at the clock and the first frame, and seven frames come meanwhile."""
+    rig.frame(SLOW)
+    rig.gate._on_control(0)
+    began_ns = rig.clock()
+    for n in range(7):
+        sent_ns = began_ns + (n + 1) * 10 * MS
+        rig.control.send(pack_frame(GateFrame(2 + n, 2 + n, sent_ns, 2, SLOW)))
+    looks = iter([began_ns])
+    monkeypatch.setattr(gate_process, "monotonic_ns", lambda: next(looks, began_ns + 70 * MS))
+    rig.gate._on_control(0)
+    monkeypatch.setattr(gate_process, "monotonic_ns", lambda: began_ns + 72 * MS)
+    rig.gate._on_clock(0)
+    record = rig.record()
+    assert (record.latched, record.accepted_seq) == (False, 8)
+
+
 def test_over_a_lost_link_nothing_counts_as_sent(rig):
     rig.frame(SLOW)
     rig.gate._on_control(0)

@@ -40,7 +40,7 @@ def frame(seq, now_ns, twist=SLOW):
 
 def rolling():
     """Return a gate that let one slow command out at T0."""
-    shell, latching = NEW.on_frames([frame(1, T0)], T0).on_leaving(T0)
+    shell, latching = NEW.on_frames([frame(1, T0)], T0, T0).on_leaving(T0)
     assert latching is None
     assert shell.due(T0) == SLOW
     return shell.on_sent(SLOW, SLOW, T0)
@@ -70,15 +70,24 @@ def test_nothing_leaves_before_the_first_frame():
 def test_only_accepted_frames_are_accepted():
     shell = rolling()
     assert (shell.record.accepted_seq, shell.record.verdict) == (1, 0)
-    after = shell.on_frames([frame(3, T0 + 10 * MS)], T0 + 10 * MS)
+    after = shell.on_frames([frame(3, T0 + 10 * MS)], T0 + 10 * MS, T0 + 10 * MS)
     assert (after.record.accepted_seq, after.record.verdict) == (1, 4)  # one is missing: SEQUENCE
-    nonsense = shell.on_frames([None], T0 + 10 * MS)
+    nonsense = shell.on_frames([None], T0 + 10 * MS, T0 + 10 * MS)
     assert (nonsense.record.accepted_seq, nonsense.record.verdict) == (1, 3)
-    assert after.on_frames([frame(2, T0 + 20 * MS)], T0 + 20 * MS).record.accepted_seq == 1
+    assert after.on_frames([frame(2, T0 + 20 * MS)], T0 + 20 * MS, T0 + 20 * MS).record.accepted_seq == 1
 
 
 def test_no_frame_changes_nothing():
-    assert rolling().on_frames([], T0 + 10 * MS) == rolling()
+    assert rolling().on_frames([], T0 + 10 * MS, T0 + 10 * MS) == rolling()
+
+
+def test_a_pause_while_frames_are_read_is_no_silence_of_control():
+    """It falls between the look at the clock and the first frame, and seven frames come meanwhile."""
+    frames = [frame(2 + n, T0 + (n + 1) * 10 * MS) for n in range(7)]
+    shell = rolling().on_frames(frames, T0, T0 + 70 * MS)
+    assert shell.record.accepted_seq == 8
+    assert shell.on_clock(T0 + 120 * MS, UP).gate.latch == Latch.NONE
+    assert shell.on_clock(T0 + 120 * MS + 1, UP).gate.latch == Latch.SILENCE
 
 
 def test_what_the_base_says_is_in_the_record():
@@ -127,7 +136,7 @@ def test_silence_latches_after_50_ms():
 
 
 def test_an_own_pause_of_more_than_100_ms_latches_whatever_was_read_meanwhile():
-    shell = rolling().on_frames([frame(2, T0 + 100 * MS)], T0 + 100 * MS)
+    shell = rolling().on_frames([frame(2, T0 + 100 * MS)], T0 + 100 * MS, T0 + 100 * MS)
     assert told(shell, 100) is None
     frozen, latching = shell.on_leaving(T0 + 100 * MS + 1)
     assert latching == Latching(2, 42, Latch.PAUSED, "the gate itself was frozen for more than 100 ms", "F67")
@@ -135,7 +144,7 @@ def test_an_own_pause_of_more_than_100_ms_latches_whatever_was_read_meanwhile():
 
 
 def test_leaving_is_what_shows_that_the_gate_runs():
-    shell, _ = rolling().on_frames([frame(2, T0 + 90 * MS)], T0 + 90 * MS).on_leaving(T0 + 90 * MS)
+    shell, _ = rolling().on_frames([frame(2, T0 + 90 * MS)], T0 + 90 * MS, T0 + 90 * MS).on_leaving(T0 + 90 * MS)
     assert told(shell, 190) is None
 
 
@@ -151,13 +160,13 @@ def test_a_lost_link_latches_and_is_named():
     [([None], Latch.NONSENSE, "F36"), ([frame(2, T0 + MS, FAST)], Latch.ENVELOPE, "F36")],
 )
 def test_a_bad_frame_is_a_fault_of_its_own(frames, latch, fault):
-    latching = told(rolling().on_frames(frames, T0 + 10 * MS), 10)
+    latching = told(rolling().on_frames(frames, T0 + 10 * MS, T0 + 10 * MS), 10)
     assert latching is not None
     assert (latching.latch, latching.fault) == (latch, fault)
 
 
 def test_the_normal_end_is_no_fault_and_a_death_in_motion_is():
-    at_rest = rolling().on_frames([frame(2, T0 + 9 * MS, ZERO)], T0 + 9 * MS).on_control_gone(T0 + 10 * MS)
+    at_rest = rolling().on_frames([frame(2, T0 + 9 * MS, ZERO)], T0 + 9 * MS, T0 + 9 * MS).on_control_gone(T0 + 10 * MS)
     assert told(at_rest, 10) == Latching(2, 42, Latch.EOF, "control has ended", "")
     moving = told(left_behind(), 10)
     assert moving is not None
@@ -167,7 +176,7 @@ def test_the_normal_end_is_no_fault_and_a_death_in_motion_is():
 def test_a_latch_is_told_once_and_the_first_cause_stays():
     shell, first = rolling().on_clock(T0 + 10 * MS, GONE).on_leaving(T0 + 10 * MS)
     assert first is not None
-    later = shell.on_frames([None], T0 + 20 * MS).on_control_gone(T0 + 30 * MS)
+    later = shell.on_frames([None], T0 + 20 * MS, T0 + 20 * MS).on_control_gone(T0 + 30 * MS)
     assert told(later, 30) is None
     assert later.gate.latch == Latch.LINK
 

@@ -143,7 +143,7 @@ class Lockstep:
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
         """Pass the command through the gate, as its process does."""
         frame = GateFrame(self._gate.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
-        self._gate = self._gate.on_frames((frame,), now_ns).on_clock(now_ns, self._base.health())
+        self._gate = self._gate.on_frames((frame,), now_ns, now_ns).on_clock(now_ns, self._base.health())
         self._gate, latching = self._gate.on_leaving(now_ns)
         if latching is not None:
             self._gate_log.latched(now_ns, *astuple(latching))
