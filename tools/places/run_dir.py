@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import time
 from pathlib import Path
 
 from robot_io.errors import UsageError
 from robot_io.rig.config import RigConfig, rig_to_toml
-from tools.places.whole_file import check_writable, write_whole
+from tools.places.whole_file import check_writable
 
 MOST_IN_A_SECOND = 1000
 RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
@@ -60,8 +59,3 @@ def write_config(path: Path, rig: RigConfig) -> str:
     text = rig_to_toml(rig)
     (path / "config.toml").write_text(text, encoding="utf-8")
     return text
-
-
-def write_json(path: Path, value: object) -> None:
-    """Write a JSON file whole or not at all."""
-    write_whole(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())

@@ -25,6 +25,7 @@ from robot_io.rig.config import RigConfig
 from safety.gate import Latch
 from tools.places import run_dir
 from tools.places.saved_tare import SavedTare
+from tools.places.whole_file import write_json
 from tools.run.aftermath import figures_of
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
@@ -103,7 +104,7 @@ class Launcher:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)
         names = self._processes.start_the_rest(run_dir.write_config(self._out, self._rig))
         pids = {"schema": 1, "launcher": os.getpid(), **self._processes.pids}
-        run_dir.write_json(self._out / "processes.json", pids)
+        write_json(self._out / "processes.json", pids)
         self._wait_ready(names, READY_NS)
         self._tell_priorities()
         self._began = True

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from robot_io.errors import UsageError
-from tools.places.whole_file import check_writable, write_whole
+from tools.places.whole_file import check_writable, write_json, write_whole
 from tools.study.items import Part, Row
 
 STUDY_FILE = "study.json"
@@ -92,7 +92,7 @@ class Store:
 
     def write_json(self, name: str, value: object) -> None:
         """Write JSON for people and programs."""
-        self.write_bytes(name, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())
+        write_json(self.out / name, value)
 
     def write_bytes(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all."""
