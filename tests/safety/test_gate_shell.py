@@ -90,6 +90,13 @@ def test_a_pause_while_frames_are_read_is_no_silence_of_control():
     assert shell.on_clock(T0 + 120 * MS + 1, UP).gate.latch == Latch.SILENCE
 
 
+def test_a_pause_after_the_look_at_the_clock_makes_no_frame_old():
+    shell = rolling().on_frames([frame(2, T0 + 10 * MS)], T0 + 12 * MS, T0 + 82 * MS)
+    assert (shell.gate.latch, shell.record.accepted_seq) == (Latch.NONE, 2)
+    stale = rolling().on_frames([frame(2, T0 + 10 * MS)], T0 + 60 * MS + 1, T0 + 60 * MS + 1)
+    assert (stale.gate.latch, stale.record.accepted_seq) == (Latch.STALE, 1)
+
+
 def test_what_the_base_says_is_in_the_record():
     shell = NEW.on_samples(
         [
@@ -114,6 +121,7 @@ def test_what_the_base_says_is_in_the_record():
         status_received_ns=T0 + 6 * MS,
     )
     assert NEW.on_samples([heard(CommandEcho(SLOW), 1)]) == NEW
+    assert NEW.on_samples([heard(BasePose(Pose2D(1.0, 2.0, 0.5)), 1)]).record.pose_valid
 
 
 def test_three_speeds_in_a_row_beyond_the_envelope_latch():
@@ -153,6 +161,12 @@ def test_a_lost_link_latches_and_is_named():
     assert latching is not None
     assert (latching.latch, latching.fault) == (Latch.LINK, "F30")
     assert latching.text == "the base link is gone: the bridge closed the connection"
+
+
+def test_a_link_lost_behind_another_latch_is_not_named():
+    latching = told(rolling().on_clock(T0 + 51 * MS, GONE), 51)
+    assert latching is not None
+    assert (latching.latch, latching.text) == (Latch.SILENCE, "control was silent for 50 ms")
 
 
 @pytest.mark.parametrize(
