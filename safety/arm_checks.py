@@ -16,15 +16,6 @@ STALE_STOP_NS = 100_000_000
 MAX_JOINT_SPEED_RAD_PER_S = 0.02
 JOINT_SPEED_PACKETS = 2
 
-FAULT_OF_STATE: dict[int, str] = {
-    ArmState.EMERGENCY_STOP: "F23",
-    ArmState.PROTECTIVE_STOP: "F22",
-    ArmState.OFF: "F27",
-    ArmState.MOVING: "F27",
-    ArmState.UNKNOWN: "F27",
-    ArmState.FOREIGN_PROGRAM: "F28",
-}
-
 
 def check(
     settings: SafetySettings, state: SafetyState, inp: TickInput, control: ControlState
@@ -65,8 +56,14 @@ def check(
 
 def _of_state(settings: SafetySettings, inp: TickInput) -> list[str]:
     state = inp.arm.joints.state
-    if state != ArmState.HOLDING:  # a number that is no ArmState as well
-        return [FAULT_OF_STATE.get(state, "F27")]
+    if state == ArmState.EMERGENCY_STOP:
+        return ["F23"]
+    if state == ArmState.PROTECTIVE_STOP:
+        return ["F22"]
+    if state == ArmState.FOREIGN_PROGRAM:
+        return ["F28"]
+    if state != ArmState.HOLDING:  # off, moved by hand, unknown, and a number that is no state at all
+        return ["F27"]
     if settings.servo and not inp.arm.servo:
         return ["F20-stop"]
     return []

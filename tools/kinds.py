@@ -67,8 +67,7 @@ def ask(kinds: dict[str, str], folder: str) -> dict[str, Told]:
             ) from None
         child.hear()
         if child.errors:
-            error = child.errors[0]
-            raise ConfigError(error["what"], where=error["where"], do=error["do"])
+            raise child.errors[0]
         if child.ready is None:
             raise ConfigError(
                 f"importing {_names(kinds)} {child.how_it_ended()}", do="Import it in a Python of its own"

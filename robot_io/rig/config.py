@@ -17,12 +17,13 @@ from msgspec import Meta
 
 from robot_io.driver import SensorFacts
 from robot_io.errors import ConfigError
+from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
-from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table, Vector6
+from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
 from robot_io.rig.world import WorldConfig
 
 RIGS_DIR = Path(__file__).parent

@@ -50,6 +50,7 @@ class Gate:
         job = {
             "base": {"url": url},
             "frames": {**UNTURNED, "sensor_in_base_m": (0, 0, 0)},
+            "kind_folder": "",
             "limits": LIMITS,
             **dict(zip(("control_fd", "record_fd", "ring_fd"), fds, strict=True)),
             "status_fd": -1,

@@ -15,9 +15,8 @@ import msgspec
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.driver import Driver
 from robot_io.errors import PushError
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES, pack_arm_record
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import find_kind
 from robot_io.messages import ArmRecord, JointState, LinkState
@@ -55,7 +54,7 @@ def main() -> int:
         return error.exit_code
     status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
     lock_memory()
-    record = SharedRecord(job.record_fd, ARM_RECORD_BYTES)
+    record = TypedRecord(job.record_fd, ARM_RECORD)
     newest = ArmRecord(child_pid=os.getpid())
     try:
         while not asked and newest.link != LinkState.LOST:
@@ -67,7 +66,7 @@ def main() -> int:
     return 0
 
 
-def publish(driver: Driver[JointState], record: SharedRecord, before: ArmRecord, *, servo: bool) -> ArmRecord:
+def publish(driver: Driver[JointState], record: TypedRecord[ArmRecord], before: ArmRecord, *, servo: bool) -> ArmRecord:
     """Publish the newest state of the driver, also when there is no new one; return it."""
     samples, link = driver.drain(), driver.health().state
     newest = before
@@ -76,7 +75,7 @@ def publish(driver: Driver[JointState], record: SharedRecord, before: ArmRecord,
         newest = msgspec.structs.replace(before, joints=sample.value, packets=sample.seq, changed_ns=sample.received_ns)
     holds = servo and link == LinkState.UP
     newest = msgspec.structs.replace(newest, link=int(link), servo=holds, published_ns=monotonic_ns())
-    record.publish(pack_arm_record(newest))
+    record.publish(newest)
     return newest
 
 

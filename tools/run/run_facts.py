@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import platform
 
+from robot_io import __version__
 from robot_io.rig.config import RigConfig
-
-PROGRAM_VERSION = "0.1.0"
 
 
 def program_and_machine() -> dict[str, str]:
     """Return what can make a replay differ in the last bit: program, Python, C library, processor."""
     return {
-        "program": f"single-point-push {PROGRAM_VERSION}",
+        "program": f"single-point-push {__version__}",
         "python": platform.python_version(),
         "libm": " ".join(platform.libc_ver()),
         "machine": platform.machine(),
