@@ -42,6 +42,6 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
             rig.path.expected_contact_m,
             max(rig.control.ramp_s, rig.control.push_speed_m_per_s / rig.limits.max_acceleration_m_per_s2),
             1.0 / rig.loop.rate_hz,
-            round(100 * rig.ft.tare_seconds_s),
+            round(100 * rig.ft.tare_s),
             in_contact,
         )

@@ -16,6 +16,7 @@ from msgspec import Meta
 
 from robot_io.rig import config, topics, world
 from robot_io.rig.config import RigConfig
+from robot_io.rig.renames import RENAMED, RETIRED, advice
 
 INTRO = """# Rig files
 
@@ -37,6 +38,13 @@ the nearest known one. The program's own ceilings (`safety/limits.py`) may only 
 """
 
 
+RENAMES = """
+## Renamed keys
+
+`push config check` names every one of these in a rig file, with its line. In logs they are read by the log's format.
+"""
+
+
 def reference() -> str:
     """Return the page."""
     parts = [INTRO]
@@ -52,6 +60,8 @@ def reference() -> str:
                 continue
             note = notes.get((table.__name__, field.name), "").replace("\n", " ").replace("|", "\\|")
             parts.append(f"| `{field.name}` | {_type_text(hints[field.name])} | {_default(field)} | {note} |")
+    parts.append(RENAMES)
+    parts += [f"- {advice(key)}." for key in (*(one.old for one in RENAMED), *(one.key for one in RETIRED))]
     return "\n".join(parts) + "\n"
 
 
