@@ -22,7 +22,7 @@ from tools.cli import COMMANDS
 from tools.dev.fault_table import table
 from tools.dev.rig_reference import reference
 from tools.rig import resolve_rig
-from tools.run.run_facts import PROGRAM_VERSION
+from tools.run.code_facts import PROGRAM_VERSION
 from tools.study.grid import load_grid
 
 ROOT = Path(__file__).parents[2]

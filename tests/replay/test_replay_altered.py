@@ -129,11 +129,11 @@ def test_no_flipped_byte_of_a_tick_passes(three_ticks, monkeypatch):
     """Each byte of the first, a middle and the last tick, one bit each; the checksums of the file would be right."""
     messages = list(verified_log.read_log(three_ticks))
     summary = verified_log.read_summary(three_ticks)
-    rig = verified_log.rig_from_toml(summary.attachments["config.toml"].decode())
+    rig = verified_log.rig_of_log(summary.attachments["config.toml"].decode(), 2)
     given = messages
     monkeypatch.setattr(verified_log, "read_log", lambda path: iter(given))
     monkeypatch.setattr(verified_log, "read_summary", lambda path: summary)
-    monkeypatch.setattr(verified_log, "rig_from_toml", lambda text: rig)
+    monkeypatch.setattr(verified_log, "rig_of_log", lambda *_: rig)
     assert verdict(three_ticks) == 0
     at = [i for i, message in enumerate(messages) if message.topic == "/control/tick"]
     for place in at:
