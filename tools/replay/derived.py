@@ -69,7 +69,7 @@ class DerivedReplayer:
         self._not_compared, self._compared = compared & other, compared - other
         self._waiting: dict[Place, list[Waiting]] = {}
         self._newest: dict[str, list[Message]] = {}
-        self._scene_made = False
+        self._scene_made = self._too_many = False
         self._failed: Difference | None = None
         self._seen = self._twins = 0
 
@@ -100,7 +100,7 @@ class DerivedReplayer:
                 for topic, log_time_ns, payload in made:
                     self._forget((log_time_ns, topic), payload)
         first = self._failed
-        if self._waiting:
+        if self._waiting and not self._too_many:
             place = min(self._waiting)
             if first is None or place[0] < first.tick:
                 first = _named(place, self._waiting[place])
@@ -129,9 +129,10 @@ class DerivedReplayer:
                 return
         if len(self._waiting) < MOST_WAITING:
             self._waiting.setdefault(place, []).append(Waiting(payload, derived))
-        else:
+        elif not self._too_many:
+            self._too_many = True
             what = f"more than {MOST_WAITING} messages far from what they come of"
-            self._failed = self._failed or Difference(place[0], place[1], what, "one at a time")
+            self._failed = Difference(place[0], place[1], what, "each beside it")
 
     def _same(self, place: Place, one: bytes, other: bytes) -> bool:
         if one == other or self._tolerance is None:
