@@ -99,6 +99,7 @@ def resealed(path: Path, out: Path, edit: Edit, **more: Any) -> Path:
     """Write the log again as a forger who mends the seal as well; `more` as for `rewritten`."""
     kept: Messages = []
     channels = read_summary(path).channels
+    schema: Callable[[str], str] = more.get("schema", lambda text: text)
 
     def keep(messages: Messages) -> Messages:
         kept.extend(edit(messages))
@@ -107,7 +108,7 @@ def resealed(path: Path, out: Path, edit: Edit, **more: Any) -> Path:
     def mend(name: str, values: dict[str, str]) -> dict[str, str]:
         seal = LogSeal()
         for channel in channels:
-            seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
+            seal.declare(channel.topic, channel.schema_name, schema(channel.schema_text).encode())
         for topic, message in kept:
             seal.note(topic, message.log_time, message.data)
         return {**values, **seal.facts()} if name == "run_end" else values
