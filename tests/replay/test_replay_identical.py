@@ -35,6 +35,11 @@ def test_every_tick_and_every_state_of_the_world_is_identical(level, request, ca
             "identical": told["derived"]["messages"],
             "first_difference": None,
         },
+        "arrived": {
+            "messages": told["arrived"]["messages"],
+            "identical": told["arrived"]["messages"],
+            "first_difference": None,
+        },
         "complete": True,
         "made_by": told["made_by"] | {"format": 2},
         "notes": [],
@@ -45,6 +50,7 @@ def test_every_tick_and_every_state_of_the_world_is_identical(level, request, ca
     topics = {counts.channels[n].topic: count for n, count in counts.statistics.channel_message_counts.items()}
     assert told["ticks"] == topics["/control/tick"]
     assert told["world"]["states"] == topics["/world/state"]
+    assert told["arrived"]["messages"] > 300
     assert told["derived"]["messages"] == sum(topics.get(topic, 0) for topic in DERIVED)
 
 

@@ -57,6 +57,9 @@ def lines(result: ReplayResult) -> Iterator[str]:
         differences.append(("world state ", result.world.first_difference))
     yield f"derived: {result.derived.identical} of {result.derived.messages} messages identical"
     differences.append(("message at ", result.derived.first_difference))
+    if result.arrived is not None:
+        yield f"arrived: {result.arrived.identical} of {result.arrived.messages} messages as the ticks hold them"
+        differences.append(("message at ", result.arrived.first_difference))
     if result.gaps:
         yield f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)"
     for note in result.notes:
@@ -93,6 +96,13 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
             "messages": result.derived.messages,
             "identical": result.derived.identical,
             "first_difference": _plain(result.derived.first_difference),
+        },
+        "arrived": None
+        if result.arrived is None
+        else {
+            "messages": result.arrived.messages,
+            "identical": result.arrived.identical,
+            "first_difference": _plain(result.arrived.first_difference),
         },
         "complete": result.complete,
         "made_by": {

@@ -13,7 +13,7 @@ import msgspec
 
 from robot_io.errors import LogDamaged
 from robot_io.log import log_format
-from robot_io.log.channels import BY_TOPIC, DERIVED
+from robot_io.log.channels import DERIVED
 from robot_io.log.mcap_read import ChannelInfo
 from robot_io.log.messages import GATE_SAYS, SAFETY_EVENT
 from robot_io.log.world_messages import WorldState
@@ -21,7 +21,8 @@ from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick
 from tools.log.derivation import SLIDER_TOPIC, TICK_TOPIC, WORLD_TOPIC, Derivation
 from tools.log.tick_topics import Message
-from tools.replay.difference import Difference, difference
+from tools.replay.difference import Difference
+from tools.replay.payloads import is_todays, same, where_they_differ
 
 SCENE = ("/robot_description", "/tf_static", "/path")
 EVENTS, ROSOUT = "/safety/event", "/rosout"
@@ -64,7 +65,7 @@ class DerivedReplayer:
         compared = {channel.topic for channel in DERIVED} | {EVENTS, ROSOUT}
         if not self._derive.slider_is_seen:
             compared.add(SLIDER_TOPIC)
-        other = {channel.topic for channel in channels if not _is_todays(channel)}
+        other = {channel.topic for channel in channels if not is_todays(channel)}
         other |= {topic for topic, last_format in log_format.CHANGED_TOPICS if its_format <= last_format}
         self._not_compared, self._compared = compared & other, compared - other
         self._waiting: dict[Place, list[Waiting]] = {}
@@ -123,7 +124,7 @@ class DerivedReplayer:
         """Find the twin of a message, or let it wait."""
         waiting = self._waiting.get(place, ())
         for i, other in enumerate(waiting):
-            if other.derived != derived and self._same(place, payload, other.payload):
+            if other.derived != derived and same(place[1], payload, other.payload, self._tolerance):
                 self._drop(place, i)
                 self._twins += 1
                 return
@@ -133,15 +134,6 @@ class DerivedReplayer:
             self._too_many = True
             what = f"more than {MOST_WAITING} messages far from what they come of"
             self._failed = Difference(place[0], place[1], what, "each beside it")
-
-    def _same(self, place: Place, one: bytes, other: bytes) -> bool:
-        if one == other or self._tolerance is None:
-            return one == other
-        cdr_type = BY_TOPIC[place[1]].cdr_type
-        try:
-            return difference(0, cdr_type.decode(one), cdr_type.decode(other), self._tolerance) is None
-        except LogDamaged:
-            return False
 
     def _forget(self, place: Place, payload: bytes) -> None:
         for i, other in enumerate(self._waiting.get(place, ())):
@@ -156,13 +148,6 @@ class DerivedReplayer:
             del self._waiting[place]
 
 
-def _is_todays(channel: ChannelInfo) -> bool:
-    known = BY_TOPIC.get(channel.topic)
-    if known is None:
-        return True
-    return (channel.schema_name, channel.schema_text) == (known.cdr_type.name, known.cdr_type.schema_text)
-
-
 def _is_of_the_gate(payload: bytes) -> bool:
     """Return whether an event is the gate's own word, which came in and was not derived."""
     try:
@@ -172,18 +157,6 @@ def _is_of_the_gate(payload: bytes) -> bool:
 
 
 def _named(place: Place, waiting: list[Waiting]) -> Difference:
-    """Name what differs at a place: a field of two messages that should be one, or a message too many or too few."""
-    log_time_ns, topic = place
     mine = next((one.payload for one in waiting if one.derived), None)
     logged = next((one.payload for one in waiting if not one.derived), None)
-    if mine is None or logged is None:
-        found = ("a message", "none") if mine is None else ("no message", "one")
-        return Difference(log_time_ns, topic, *found)
-    cdr_type = BY_TOPIC[topic].cdr_type
-    try:
-        leaf = difference(log_time_ns, cdr_type.decode(logged), cdr_type.decode(mine), None)
-    except LogDamaged:
-        leaf = None
-    if leaf is None:
-        return Difference(log_time_ns, topic, "bytes", "other bytes")
-    return Difference(log_time_ns, f"{topic} {leaf.field}", leaf.logged, leaf.replayed)
+    return where_they_differ(*place, logged, mine)

@@ -12,10 +12,12 @@ from pathlib import Path
 
 import msgspec
 
+from robot_io.log.log_format import LOG_FORMAT
 from robot_io.log.logged_type import LoggedType
 from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.tick import TICK_CDR, ControlTick, TickState
 from tools.log.derivation import WORLD_TOPIC
+from tools.replay.arrived import ArrivedReplay, ArrivedReplayer
 from tools.replay.derived import DerivedReplay, DerivedReplayer
 from tools.replay.difference import Difference, difference
 from tools.replay.made_by import MadeBy
@@ -34,6 +36,8 @@ class ReplayResult(msgspec.Struct, frozen=True):
     first_difference: Difference | None
     world: WorldReplay | None
     derived: DerivedReplay
+    arrived: ArrivedReplay | None
+    """None where it cannot be compared: the format is not today's, or records did not fit into the gate's ring."""
     complete: bool
     notes: tuple[str, ...]
     made_by: MadeBy
@@ -42,8 +46,8 @@ class ReplayResult(msgspec.Struct, frozen=True):
     @property
     def different(self) -> bool:
         """Whether anything came out otherwise than it is in the log."""
-        parts = (self.first_difference, self.world and self.world.first_difference, self.derived.first_difference)
-        return any(part is not None for part in parts)
+        parts = (self.world, self.derived, self.arrived)
+        return self.first_difference is not None or any(part and part.first_difference for part in parts)
 
 
 def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
@@ -63,16 +67,22 @@ def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
     # A world whose records are incomplete cannot be run again.
     world = None if log.dropped("world") else WorldReplayer(rig, types, tolerance)
     derived = DerivedReplayer(rig, log.wall_offset_ns, log.channels, log.made_by.format, tolerance)
+    comparable = log.ticks.exact and log.made_by.format == LOG_FORMAT and not log.dropped("gate")
+    arrived = ArrivedReplayer(log.wall_offset_ns, log.channels, tolerance) if comparable else None
     for topic, log_time_ns, payload, tick in log.messages():
         if tick is not None:
             ticks.take(tick, payload)
             derived.tick(tick, log_time_ns)
+            if arrived is not None:
+                arrived.tick(tick)
             continue
         if topic.startswith(PREFIX) and world is not None:
             world.take(topic, payload)
         if topic == WORLD_TOPIC:
             derived.world(types.state.decode(payload), log_time_ns)
         derived.seen(topic, log_time_ns, payload)
+        if arrived is not None:
+            arrived.seen(topic, log_time_ns, payload)
     ran = None if world is None else world.result()
     made = derived.result(complete=log.complete)
     result = ReplayResult(
@@ -82,6 +92,7 @@ def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
         ticks.first,
         ran,
         made,
+        None if arrived is None else arrived.result(complete=log.complete),
         log.complete,
         (*_notes(log, ticks.last), *_world_notes(world, ran, types, level_of(rig)), *_derived_notes(made)),
         log.made_by,
