@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from robot_io.log.mcap_read import read_log, read_summary
 from robot_io.log.world_messages import STATE_CDR
 from robot_io.tick import ControlTick
 from tests.replay.older import EditText, as_older, instead, older_type, without, write_older
-from tests.replay.runs import changed, replayed, resealed
+from tests.replay.runs import Edit, Messages, changed, replayed, resealed, rewritten
 from tools.cli import main
 
 DIFFERS, DAMAGED = 7, 8
@@ -182,3 +183,45 @@ def test_a_tick_of_another_type_is_no_log_of_ours(older_log, some_ticks, tmp_pat
             log, tmp_path / f"{n}.mcap", lambda m: m, schema=lambda t, e=edit: e(t) if "crc32_before" in t else t
         )
         assert replayed(capsys, out)[0] == DAMAGED
+
+
+def payload_sum(messages: Messages) -> str:
+    """The seal of early logs, as they were written: CRC-32 of each topic and payload, summed up."""
+    return f"{sum(zlib.crc32(topic.encode() + m.data) for topic, m in messages) % 2**32:08x}"
+
+
+@pytest.mark.parametrize("seal", ["payloads", "none"])
+def test_the_seals_of_early_logs_cover_what_they_covered(seal, sim_log, tmp_path, capsys):
+    kept: Messages = []
+
+    def write(name: str, edit: Edit, *, later: Edit = lambda messages: messages) -> Path:
+        def sealed_then_edited(messages: Messages) -> Messages:
+            kept[:] = edit(messages)
+            return later(kept)
+
+        def facts(name: str, values: dict[str, str]) -> dict[str, str]:
+            ours = ("message_sum", "config_crc32", "format", "commit", "dirty")
+            early = {key: value for key, value in values.items() if key not in ours}
+            return {**early, "payload_sum": payload_sum(kept)} if (name, seal) == ("run_end", "payloads") else early
+
+        return rewritten(sim_log, tmp_path / name, sealed_then_edited, metadata=facts)
+
+    code, told = replayed(capsys, write("whole.mcap", lambda messages: messages))
+    assert (code, told["identical"]) == (0, told["ticks"])
+    uncovered = "types and times of messages" if seal == "payloads" else "messages but ticks"
+    assert told["notes"] == [f"the log's seal does not cover its config.toml, nor {uncovered}"]
+    status = changed("/base/status", 2, lambda data: data[:-9] + bytes((data[-9] ^ 1,)) + data[-8:])
+    assert replayed(capsys, write("edited.mcap", lambda m: m, later=status))[0] == (
+        DAMAGED if seal == "payloads" else 0
+    )
+    wrench = changed("/ft/wrench", 50, lambda data: data[:-9] + bytes((data[-9] ^ 1,)) + data[-8:])
+    assert replayed(capsys, write("derived.mcap", wrench))[0] == DIFFERS
+    tick = changed("/control/tick", 50, lambda data: data[:-9] + bytes((data[-9] ^ 1,)) + data[-8:])
+    assert replayed(capsys, write("tick.mcap", tick))[0] == DAMAGED
+
+
+def test_a_log_of_today_never_passes_with_an_early_seal(sim_log, tmp_path, capsys):
+    def drop(name: str, values: dict[str, str]) -> dict[str, str]:
+        return {key: value for key, value in values.items() if key not in ("message_sum", "config_crc32")}
+
+    assert replayed(capsys, rewritten(sim_log, tmp_path / "run.mcap", metadata=drop))[0] == DAMAGED

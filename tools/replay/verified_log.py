@@ -16,7 +16,7 @@ from robot_io.log.logged_type import LoggedType
 from robot_io.log.mcap_log import CONFIG_ATTACHMENT, END_METADATA, RUN_METADATA
 from robot_io.log.mcap_read import LogMessage, LogSummary, read_log, read_summary
 from robot_io.log.mcap_recover import RECOVERED_METADATA
-from robot_io.log.seal import CONFIG_FACT, LogSeal, config_seal
+from robot_io.log.seal import CONFIG_FACT, LogSeal, PayloadSeal, config_seal, seal_of
 from robot_io.rig.config import RigConfig
 from robot_io.rig.logged import rig_of_log
 from robot_io.tick import TICK_CDR, ControlTick
@@ -59,7 +59,7 @@ class VerifiedLog:
         self.config_holds = self._seal_of_config_holds(summary)
         """Whether config.toml is the one that the log was finished with."""
         self.notes: tuple[str, ...] = ()
-        """What of the config means nothing today."""
+        """What of the config means nothing today, and what is not sealed."""
         self._rig = self._read_rig(summary)
         if self._end is None and self._saved is None:
             raise self._damaged("the log does not say how it ends")
@@ -75,6 +75,10 @@ class VerifiedLog:
             where=str(self.path),
             do="Replay it with the code that made it",
         )
+
+    @property
+    def _end_facts(self) -> dict[str, str]:
+        return self._end if self._end is not None else self._saved or {}
 
     @property
     def complete(self) -> bool:
@@ -105,7 +109,7 @@ class VerifiedLog:
 
     def messages(self) -> Iterator[Item]:
         """Yield every message in the order of the file. Take all before trusting any: the end may raise LogDamaged."""
-        chain, seal = TickChain(), LogSeal()
+        chain, seal = TickChain(), seal_of(self._end_facts, self.made_by.format)
         for channel in self.channels:
             seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
         last = -1
@@ -119,19 +123,31 @@ class VerifiedLog:
         self._check_end(chain, seal, last)
 
     def _seal_of_config_holds(self, summary: LogSummary) -> bool:
-        end = self._end if self._end is not None else self._saved or {}
-        return end.get(CONFIG_FACT) == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
+        if self._end_facts and self.made_by.format == 1 and CONFIG_FACT not in self._end_facts:
+            return True  # it was not sealed then, as the notes say
+        return (
+            self._end_facts.get(CONFIG_FACT)
+            == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
+        )
 
     def _read_rig(self, summary: LogSummary) -> RigConfig | str:
         """Return the rig, or why today's program cannot use it though the log is whole."""
         try:
-            rig, self.notes = rig_of_log(summary.attachments[CONFIG_ATTACHMENT].decode(), self.made_by.format)
+            rig, notes = rig_of_log(summary.attachments[CONFIG_ATTACHMENT].decode(), self.made_by.format)
         except (KeyError, UnicodeDecodeError, RecursionError, PushError) as error:
             why = "it is missing" if isinstance(error, KeyError) else " ".join(str(error).split())
             if self.config_holds and self.made_by.other and isinstance(error, PushError):
                 return why
             raise self._damaged(f"the log holds no usable {CONFIG_ATTACHMENT}: {why}") from None
+        self.notes = (*self._seal_notes(), *notes)
         return rig
+
+    def _seal_notes(self) -> list[str]:
+        """Return what of a log of the first format was never sealed."""
+        if self.made_by.format > 1 or "message_sum" in self._end_facts:
+            return []
+        what = "types and times of messages" if "payload_sum" in self._end_facts else "messages but ticks"
+        return [f"the log's seal does not cover its config.toml, nor {what}"]
 
     def _tick(self, message: LogMessage, last: int, chained: bool) -> ControlTick:
         if not chained:
@@ -146,10 +162,10 @@ class VerifiedLog:
             raise self._damaged(f"tick {tick.input.tick} was altered: its time in the log is not its own")
         return tick
 
-    def _check_end(self, chain: TickChain, seal: LogSeal, last: int) -> None:
+    def _check_end(self, chain: TickChain, seal: LogSeal | PayloadSeal, last: int) -> None:
         if chain.ticks == 0:
             raise LogDamaged("the log holds no tick", where=str(self.path), do="The run ended before its loop began")
-        wanted = self._end if self._end is not None else self._saved or {}
+        wanted = self._end_facts
         if self._end is not None:
             ticks = {"ticks": str(chain.ticks), "last_tick_crc32": f"{chain.crc32:08x}"}
             if any(wanted.get(name) != value for name, value in ticks.items()):
