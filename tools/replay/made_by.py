@@ -34,7 +34,7 @@ class MadeBy(msgspec.Struct, frozen=True):
         return f"made by other code ({self.code})" if self.other else ""
 
 
-def made_by(log: Mapping[str, str], today: Mapping[str, str], its_format: int = LOG_FORMAT) -> MadeBy:
+def made_by(log: Mapping[str, str], today: Mapping[str, str], its_format: int) -> MadeBy:
     """Compare the facts of a log with those of the code that runs now."""
     commit, dirty = log.get(COMMIT_FACT, ""), log.get(DIRTY_FACT) == "True"
     if commit or today.get(COMMIT_FACT):
