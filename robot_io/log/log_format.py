@@ -6,7 +6,7 @@ dropped, or means something else. A new field that has a default needs nothing h
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from robot_io.errors import LogDamaged, UsageError
@@ -35,6 +35,18 @@ class EarlierValue(NamedTuple):
     last_format: int
 
 
+class ComputedValue(NamedTuple):
+    """A log up to `last_format` says `field` of `type_name` in other fields: `of` makes it from its message.
+
+    The field is dotted where it is in a part of the message, and `of` takes the whole of it, as the log has it.
+    """
+
+    type_name: str
+    field: str
+    of: Callable[[Any], Any]
+    last_format: int
+
+
 class ChangedTopic(NamedTuple):
     """Logs up to `last_format` derived the messages of `topic` in another way, so that they cannot be compared."""
 
@@ -44,6 +56,7 @@ class ChangedTopic(NamedTuple):
 
 RENAMED_FIELDS: tuple[RenamedField, ...] = ()
 EARLIER_VALUES: tuple[EarlierValue, ...] = ()
+COMPUTED_VALUES: tuple[ComputedValue, ...] = ()
 CHANGED_TOPICS: tuple[ChangedTopic, ...] = ()
 
 

@@ -1,7 +1,8 @@
 """Reads the messages of a log as the types of today: as they are when the log's schema is today's, else field by field.
 
 In an earlier log's message each field of today is looked for by its name (or the one it had, `log_format`). One that
-the log lacks gets the value it meant then, else its type's default, else zero; one that is gone is passed over.
+the log lacks gets the value it meant then or had in other fields, else its type's default, else zero; one that is gone is
+passed over.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 import msgspec
+from msgspec.structs import replace
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.cdr.schema import type_from_schema
@@ -96,7 +98,20 @@ class _Maker:
                 values.append(_field(kept, convert))
         self.gone |= {f"{path}{name}" for name in ours}
         make = today.struct_type
-        return lambda message: make(*[value(message) for value in values])
+        computed = [
+            (field.split("."), of)
+            for type_name, field, of, last_format in table.COMPUTED_VALUES
+            if type_name == today.ros_name and self._format <= last_format and f"{path}{field}" in self.missing
+        ]
+        self.missing -= {f"{path}{'.'.join(field)}" for field, _ in computed}
+
+        def convert_message(message: Any) -> Any:
+            made = make(*[value(message) for value in values])
+            for field, of in computed:
+                made = _with(made, field, of(message))
+            return made
+
+        return convert_message
 
     def _shape(self, today: Shape, logged: Shape, path: str) -> Convert | None:
         """Return what converts a field; None when the two have nothing in common."""
@@ -139,6 +154,12 @@ class _Maker:
 
 def _kind(ros: str) -> str:
     return "float" if ros.startswith("float") else "bool" if ros == "bool" else "int"
+
+
+def _with(made: Any, field: list[str], value: Any) -> Any:
+    """Return the message with another value of a field, which may be in a part of it."""
+    first, *inner = field
+    return replace(made, **{first: _with(getattr(made, first), inner, value) if inner else value})
 
 
 def _constant(value: Any) -> Convert:

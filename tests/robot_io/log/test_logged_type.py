@@ -12,7 +12,7 @@ from robot_io.cdr.cdr_type import CdrType
 from robot_io.cdr.schema import type_from_schema
 from robot_io.errors import LogDamaged, UsageError
 from robot_io.log import log_format
-from robot_io.log.log_format import EarlierValue, RenamedField, format_of
+from robot_io.log.log_format import ComputedValue, EarlierValue, RenamedField, format_of
 from robot_io.log.logged_type import LoggedType
 
 NAME = "push_msgs/msg/Whole"
@@ -118,6 +118,26 @@ def test_renamed_fields_and_earlier_values_up_to_their_format(monkeypatch):
     found, made = read("Part part\n", "float64 left\n", 2, part={"left": 4.0})
     assert found.part == Part(0.0, 2.5)
     assert made.gone == {"part.left"}
+
+
+def test_a_value_that_was_in_other_fields_is_made_of_them(monkeypatch):
+    """Also in a part of the message, from what stood outside of that part."""
+    monkeypatch.setattr(
+        log_format,
+        "COMPUTED_VALUES",
+        (
+            ComputedValue(NAME, "part.y", lambda message: message.scale * message.part.left, 1),
+            ComputedValue("push_msgs/msg/Part", "x", lambda part: part.left + 1.0, 1),
+            ComputedValue(NAME, "n", lambda message: 99, 1),
+        ),
+    )
+    found, made = read("int64 n\nfloat64 scale\nPart part\n", "float64 left\n", n=7, scale=3.0, part={"left": 4.0})
+    assert (found.n, found.part) == (7, Part(5.0, 12.0))  # n is there
+    assert {"part.x", "part.y"}.isdisjoint(made.missing)
+    assert made.gone == {"scale", "part.left"}
+    found, made = read("Part part\nfloat64 scale\n", "float64 left\n", 2, scale=3.0, part={"left": 4.0})
+    assert found.part == Part(0.0, 2.5)
+    assert {"part.x", "part.y"} < made.missing
 
 
 def test_what_is_no_such_message_is_damage():
