@@ -1,8 +1,8 @@
 """Reads the messages of a log as the types of today: as they are when the log's schema is today's, else field by field.
 
 In an earlier log's message each field of today is looked for by its name (or the one it had, `log_format`). One that
-the log lacks gets the value it meant then or had in other fields, else its type's default, else zero; one that is gone is
-passed over.
+the log lacks gets the value it meant then or had in other fields, else its type's default, else zero; one that is gone
+is passed over.
 """
 
 from __future__ import annotations
