@@ -12,13 +12,11 @@ from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
 from control.tare import judge
 from robot_io.messages import LinkState
-from robot_io.tick import ControlState, Operator, Phase, TareSums, TickInput
+from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Operator, Phase, TareSums, TickInput
 
 FRESH_NS = 100_000_000
 SETTLE_PACKETS = 20
 """Packets of each device before the start is believed."""
-REST_SPEED_M_PER_S = 0.01
-REST_NS = 300_000_000
 OVERDUE_CONTACT_M = 0.5
 """No contact this far beyond where it was expected: the object is not there."""
 BACKWARD_RAD = math.pi / 2
@@ -74,7 +72,7 @@ def _wait(settings: Settings, state: ControlState, inp: TickInput) -> ControlSta
 
 def _note_rest(state: ControlState, inp: TickInput) -> ControlState:
     twist = inp.base.odometry
-    rest = math.hypot(twist.vx, twist.vy) < REST_SPEED_M_PER_S and state.speed == 0.0
+    rest = math.hypot(twist.vx, twist.vy) < REST_M_PER_S and state.speed == 0.0
     since = (state.rest_since_ns or inp.now_ns) if rest else 0
     return state if since == state.rest_since_ns else replace(state, rest_since_ns=since)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from control.path import StraightPath
+from robot_io.geometry import StraightPath
 from robot_io.rig.config import ControlConfig, FtConfig, RigConfig
 from robot_io.rig.types import Matrix3
 
@@ -35,7 +35,7 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
         return cls(
             rig.control,
             rig.ft,
-            StraightPath.of(rig.path),
+            StraightPath.of(rig.path.origin_m, rig.path.direction_deg),
             rig.frames.base_from_sensor,
             contact_x,
             contact_y,

@@ -15,10 +15,8 @@ from enum import IntEnum
 import msgspec
 
 from robot_io.errors import DeviceNotReady
-from robot_io.messages import SensorWrench
+from robot_io.messages import SensorWrench, Vector6
 from robot_io.tick import TareSums
-
-Vector6 = tuple[float, float, float, float, float, float]
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 UNITS = ("N", "N", "N", "N*m", "N*m", "N*m")

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from robot_io.ridgeback.driver import Ridgeback
     from robot_io.ur10.driver import Ur10
 
+__version__ = "0.1.0"
 __all__ = ["Ft300", "Ridgeback", "Ur10", "errors", "messages"]
 
 __getattr__ = exports(

@@ -14,6 +14,8 @@ from typing import ClassVar, Generic, TypeVar
 import msgspec
 
 T = TypeVar("T")
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
 _NAN = float("nan")
 
 
@@ -61,7 +63,7 @@ class Pose2D(msgspec.Struct, frozen=True, gc=False):
     yaw: float = 0.0
 
 
-Joints = tuple[float, float, float, float, float, float]
+Joints = Vector6
 
 
 class JointState(msgspec.Struct, frozen=True, gc=False):
@@ -226,13 +228,16 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     accepted_seq: int = 0
     """Sequence number of the last frame of control that the gate accepted."""
     verdict: int = 0
-    """The gate's verdict on the newest frame it read (0: accepted)."""
+    """Why the gate did not accept the newest frame that it read (a `Latch` number; 0: it did).
+
+    After a latch this is its cause, whatever the frame. A latch without a frame shows in `latch_cause` alone."""
     sent: BodyTwist = BodyTwist()
     """What really went out last."""
     sent_ns: int = 0
     latched: bool = False
     """The gate sends nothing but zero until it is restarted."""
     latch_cause: int = 0
+    """The `Latch` that came first, 0: none."""
     published_ns: int = 0
     """When this record was written."""
 

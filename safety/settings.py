@@ -36,9 +36,9 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     def of(cls, rig: RigConfig) -> SafetySettings:
         """Resolve the settings of a rig."""
         limits = rig.limits
-        period_s = 1.0 / rig.loop.rate_hz
+        period_ns = round(1e9 / rig.loop.rate_hz)
         return cls(
-            round(period_s * 1e9),
+            period_ns,
             limits.max_force_N,
             limits.slow_force_N,
             limits.max_torque_Nm,
@@ -56,6 +56,6 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
                 MAX_TURN_RATE_RAD_PER_S,
                 limits.max_acceleration_m_per_s2,
                 limits.max_yaw_acceleration_rad_per_s2,
-                period_s,
+                period_ns,
             ),
         )

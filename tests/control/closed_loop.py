@@ -12,7 +12,7 @@ from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import ArmRecord, BaseRecord, BaseStatus, BodyTwist, JointState
 from robot_io.tick import FtInput, FtReading, HostInput, Operator, TickInput, TickOutput, TickState
 from safety import gate
-from safety.gate import GateLimits, GateState
+from safety.gate import GateState
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
 from tools.run.tick_core import TickCore
@@ -44,7 +44,7 @@ class ClosedLoop:
         self.tick = 0
         self.operator = Operator.NONE
         self.gate = GateState()
-        self._gate_limits = GateLimits.of(self.core.safety)
+        self._gate_limits = self.core.safety.envelope
         self._ft_period_ns = 1e9 / ft_rate_hz
         self._ft_delay_ns = round(ft_delay_ms * 1e6)
         self._ft_burst_ns = ft_burst_ms * 1_000_000

@@ -99,7 +99,7 @@ def test_the_settings_are_in_si_units():
     assert settings.max_heading_error == pytest.approx(math.radians(5.0))
     assert settings.pose_period_ns == 10_000_000
     limits = settings.envelope
-    assert (limits.speed, limits.turn_rate, limits.period_s) == (pytest.approx(0.15), 0.25, 0.01)
+    assert (limits.speed, limits.turn_rate, limits.period_ns) == (pytest.approx(0.15), 0.25, 10_000_000)
 
 
 def test_an_approach_that_the_envelope_would_clamp_is_refused():

@@ -12,6 +12,9 @@ from robot_io.clock import NS_PER_S
 from robot_io.log.channels import BY_TOPIC
 from robot_io.log.messages import LoopTiming, SafetyEvent
 from robot_io.log.ros_messages import (
+    BASE_FRAME,
+    SENSOR_FRAME,
+    WORLD_FRAME,
     DiagnosticArray,
     DiagnosticStatus,
     Header,
@@ -21,19 +24,18 @@ from robot_io.log.ros_messages import (
     TFMessage,
     Transform,
     TransformStamped,
-    Twist,
     TwistStamped,
     Vector3,
     Wrench,
     WrenchStamped,
+    planar_twist,
     ros_time,
     yaw_quaternion,
 )
-from robot_io.messages import BodyTwist, LinkState
+from robot_io.messages import LinkState
 from robot_io.tick import ControlTick, FtReading, Mode
 from safety.faults import FAULTS
 
-WORLD_FRAME, BASE_FRAME, SENSOR_FRAME = "world", "base_link", "ft_sensor"
 JOINT_NAMES = (
     "shoulder_pan_joint",
     "shoulder_lift_joint",
@@ -79,8 +81,8 @@ class TickTopics:
         messages = [self._raw_wrench(reading) for reading in inp.ft.readings]
         force = Vector3(*tick.after.control.force_world)
         messages.append(message("/ft/wrench", now_ns, WrenchStamped(header, Wrench(force, _NO_TORQUE))))
-        messages.append(message("/base/cmd_vel_raw", now_ns, _twist(body, out.wanted_body)))
-        messages.append(message("/base/cmd_vel", now_ns, _twist(body, out.command_body)))
+        messages.append(message("/base/cmd_vel_raw", now_ns, TwistStamped(body, planar_twist(out.wanted_body))))
+        messages.append(message("/base/cmd_vel", now_ns, TwistStamped(body, planar_twist(out.command_body))))
         host = inp.host
         timing = LoopTiming(
             header, inp.tick, inp.now_ns - host.late_ns, host.late_ns, host.skipped, host.skipped > 0, host.log_dropped
@@ -142,10 +144,6 @@ class TickTopics:
             line = f"{fault} {text}".strip()
             messages.append(message("/rosout", now_ns, Log(header.stamp, level, "safety", line, "", "", 0)))
         return messages
-
-
-def _twist(header: Header, twist: BodyTwist) -> TwistStamped:
-    return TwistStamped(header, Twist(Vector3(twist.vx, twist.vy, 0.0), Vector3(0.0, 0.0, twist.omega)))
 
 
 def _mode(number: int) -> str:

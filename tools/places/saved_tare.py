@@ -13,9 +13,10 @@ from pathlib import Path
 import msgspec
 
 from robot_io.errors import UsageError
+from robot_io.messages import Vector6
 from robot_io.rig.config import RigConfig
-from robot_io.tick import Vector6
 from tools.places.state_dir import file_name, state_dir
+from tools.places.whole_file import write_whole
 
 MAX_AGE_S = 12 * 3600.0
 
@@ -40,7 +41,7 @@ def power_cycle(rig: RigConfig) -> str:
 def save(rig: RigConfig, bias: Vector6, joints: Vector6) -> None:
     """Keep a tare for later runs of this rig."""
     tare = SavedTare(bias, joints, power_cycle(rig), time.time())
-    _path(rig).write_bytes(msgspec.json.encode(tare))
+    write_whole(_path(rig), msgspec.json.encode(tare))
 
 
 def load(rig: RigConfig) -> SavedTare:

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Message, Metadata
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.clock import NS_PER_S
 from robot_io.errors import LogDamaged, PushError
-from robot_io.geometry import wrap_angle, yaw_from_quaternion
+from robot_io.geometry import StraightPath, wrap_angle, yaw_from_quaternion
 from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
 from robot_io.log.mcap_log import RUN_METADATA
-from robot_io.log.mcap_walk import Grown, walk
+from robot_io.log.mcap_walk import Grown, Topic, walk
 from robot_io.log.messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
 from robot_io.log.ros_messages import POSE_STAMPED
 from robot_io.log.world_messages import STATE_CDR
@@ -96,16 +96,12 @@ def read_run(path: Path, *, grown: Grown | None = None) -> RunData:
     """
     reader = _Reader(path)
     topics: dict[int, str] = {}
-    schemas: dict[int, Schema] = {}
     for item in walk(path, grown=grown):
         if isinstance(item, Message):
             reader.message(topics[item.channel_id], item.log_time, item.data)
-        elif isinstance(item, Channel):
-            topics[item.id] = item.topic
-            schema = schemas[item.schema_id]
-            reader.channel(item.topic, schema.name, schema.data)
-        elif isinstance(item, Schema):
-            schemas[item.id] = item
+        elif isinstance(item, Topic):
+            topics[item.channel.id] = item.channel.topic
+            reader.channel(item.channel.topic, item.schema.name, item.schema.data)
         elif isinstance(item, Attachment) and item.name == "config.toml":
             reader.config(item.data)
         elif isinstance(item, Metadata):
@@ -218,7 +214,8 @@ class _Reader:
         )
 
     def _tick(self, time_s: float, payload: bytes) -> None:
-        rig = self._rig or self._read_rig("it holds no config.toml before its first tick")
+        if self._rig is None:
+            self._read_rig("it holds no config.toml before its first tick")
         self._count += 1
         self._last_payload = payload
         if not self._ticks.wants():
@@ -228,7 +225,7 @@ class _Reader:
             self._first = tick
             self._first_tick_s = time_s
             self._modes.begin("", str(tick.after.safety.mode), "", time_s)
-        self._ticks.add(self._row(rig, tick, time_s))
+        self._ticks.add(self._row(tick, time_s))
         if tick.input.ft.readings:
             self._last_reading_ns = tick.input.ft.readings[-1].received_ns
         now_ns = tick.input.now_ns
@@ -240,10 +237,9 @@ class _Reader:
             if at_ns:
                 self._ages[device].add((now_ns - at_ns) * 1e-6)
 
-    def _row(self, rig: RigConfig, tick: ControlTick, time_s: float) -> tuple[float, ...]:
+    def _row(self, tick: ControlTick, time_s: float) -> tuple[float, ...]:
         control, output, base = tick.after.control, tick.output, tick.input.base
-        x, y = output.contact_x - rig.path.origin_m[0], output.contact_y - rig.path.origin_m[1]
-        fx, fy, _ = control.force_world
+        path = self._path_frame
         raw = math.nan
         if control.tared and tick.input.ft.readings:
             raw = math.dist(tick.input.ft.readings[-1].force, control.bias_force)
@@ -252,10 +248,9 @@ class _Reader:
         held = control.phase >= Phase.APPROACH and math.isfinite(turned)
         return (
             time_s,
-            x * self._cos + y * self._sin,
-            y * self._cos - x * self._sin,
-            fx * self._cos + fy * self._sin,
-            fy * self._cos - fx * self._sin,
+            path.along(output.contact_x, output.contact_y),
+            path.lateral(output.contact_x, output.contact_y),
+            *path.vector_to_path(*control.force_world[:2]),
             raw,
             control.theta_f if driven and control.phase == Phase.PUSH else math.nan,
             control.theta_p if driven else math.nan,
@@ -286,8 +281,7 @@ class _Reader:
             self._rig = rig_of_log(self._text, its_format).rig
         except (UnicodeDecodeError, PushError) as error:
             raise self._foreign(f"its config.toml cannot be used: {error}") from None
-        heading = math.radians(self._rig.path.direction_deg)
-        self._cos, self._sin = math.cos(heading), math.sin(heading)
+        self._path_frame = StraightPath.of(self._rig.path.origin_m, self._rig.path.direction_deg)
         return self._rig
 
     def _foreign(self, what: str) -> LogDamaged:

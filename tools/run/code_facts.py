@@ -8,9 +8,9 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from robot_io import __version__
 from robot_io.log.log_format import FORMAT_FACT, LOG_FORMAT
 
-PROGRAM_VERSION = "0.1.0"
 COMMIT_FACT, DIRTY_FACT, PROGRAM_FACT = "commit", "dirty", "program"
 GIT_MAX_S = 0.2
 _CHECKOUT = Path(__file__).resolve().parents[2]
@@ -24,7 +24,7 @@ def code_facts() -> dict[str, str]:
     """Return the facts, asked once in a process; without a checkout, or where git does not answer, no commit."""
     return {
         FORMAT_FACT: str(LOG_FORMAT),
-        PROGRAM_FACT: f"single-point-push {PROGRAM_VERSION}",
+        PROGRAM_FACT: f"single-point-push {__version__}",
         **commit_of(_CHECKOUT),
         **{name: found for name in _PACKAGES if (found := _version(name))},
     }

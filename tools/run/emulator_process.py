@@ -6,10 +6,8 @@ a moment, so that the wheels are seen to come to rest and the log holds it.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import math
-import os
 import signal
 import sys
 
@@ -18,7 +16,7 @@ import msgspec
 from robot_io.clock import NS_PER_MS, monotonic_ns
 from robot_io.errors import PushError
 from robot_io.ipc.event_loop import EventLoop
-from robot_io.ipc.process import lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import rig_from_toml
@@ -31,7 +29,6 @@ PRIORITY = 70
 LINGER_NS = 1_000 * NS_PER_MS
 REST_NS = 100 * NS_PER_MS
 WATCH_NS = 20 * NS_PER_MS
-_PR_SET_PDEATHSIG = 1
 
 
 class Ending:
@@ -66,9 +63,7 @@ def main() -> int:
     """Serve until SIGTERM."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=EmulatorJob)
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGTERM), 0, 0, 0)
-    if os.getppid() != job.launcher_pid:
-        return 1
+    die_with_parent(job.launcher_pid, signal.SIGTERM)
     set_timer_slack_1ns()
     status = StatusPipe(job.status_fd)
     rig = rig_from_toml(job.rig_toml)

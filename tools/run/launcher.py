@@ -25,6 +25,7 @@ from robot_io.rig.config import RigConfig
 from safety.gate import Latch
 from tools.places import run_dir
 from tools.places.saved_tare import SavedTare
+from tools.places.whole_file import write_json
 from tools.run.aftermath import figures_of
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
@@ -103,7 +104,7 @@ class Launcher:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)
         names = self._processes.start_the_rest(run_dir.write_config(self._out, self._rig))
         pids = {"schema": 1, "launcher": os.getpid(), **self._processes.pids}
-        run_dir.write_json(self._out / "processes.json", pids)
+        write_json(self._out / "processes.json", pids)
         self._wait_ready(names, READY_NS)
         self._tell_priorities()
         self._began = True
@@ -128,7 +129,7 @@ class Launcher:
             elif event.get("event") == "warning":
                 self._live.say(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
-                self._live.say(f"recorder: {event['what']}")
+                self._live.say(f"recorder: {event['error']['what']}")
                 self._processes.tell_control(b"L")
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
@@ -220,7 +221,7 @@ class Launcher:
         for name in ("gate", "emulators", "arm", "recorder"):
             child = self._children.get(name)
             if child is not None and child.errors:
-                self.notes.append(f"{name}: {child.errors[-1].get('what', '')}")
+                self.notes.append(f"{name}: {child.errors[-1].what}")
             elif child is not None and child.process.returncode != 0:
                 self.notes.append(f"the {name} process {child.how_it_ended()}")
         said = self._said("recorder")

@@ -11,18 +11,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from control.loop import ft_input
 from control.run_notes import RunNotes, outcome
 from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
-from robot_io.messages import ArmRecord, BaseOdometry, BasePose, BaseRecord, BaseReport
+from robot_io.messages import ArmRecord
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
-from safety import gate
-from safety.gate import GateLimits, GateState
+from safety.gate_shell import GateShell
 from sim_backend.ridgeback.settings import ridgeback_settings
 from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
@@ -79,10 +78,8 @@ class Lockstep:
         )
         self._core = TickCore.of(rig, in_contact=saved is not None)
         self._state = first_state(saved)
-        self._gate_limits = GateLimits.of(self._core.safety)
-        self._gate = GateState()
+        self._gate = GateShell(self._core.safety.envelope, START_NS)
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
-        self._record = BaseRecord()
         self.notes = RunNotes()
         self.operator = Operator.NONE
 
@@ -125,7 +122,7 @@ class Lockstep:
             HostInput(0, 0, True, True, True, False, 0),
             ft_input(readings, self._ft.health()),
             self._arm.read() or ArmRecord(),
-            self._record,
+            self._gate.record,
         )
         try:
             after, output = self._core.fold(self._state, inp)
@@ -144,42 +141,25 @@ class Lockstep:
         self.notes.note(inp, output)
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
-        """Pass the command through the gate's judgement, as the gate process does."""
-        frame = GateFrame(self._gate.seq + 1, tick, now_ns, output.mode, output.command_body)
-        self._gate = gate.on_clock(gate.on_frame(self._gate_limits, self._gate, frame, now_ns), now_ns)
-        wanted = gate.due(self._gate, now_ns)
+        """Pass the command through the gate, as its process does."""
+        frame = GateFrame(self._gate.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
+        self._gate = self._gate.on_frames((frame,), now_ns, now_ns).on_clock(now_ns, self._base.health())
+        self._gate, latching = self._gate.on_leaving(now_ns)
+        if latching is not None:
+            self._gate_log.latched(now_ns, *astuple(latching))
+        wanted = self._gate.due(now_ns)
         if wanted is not None:
             really = self._base.command(wanted)
-            self._gate = gate.sent(self._gate, wanted, now_ns)
-            self._record = replace(self._record, sent=really, sent_ns=now_ns)
+            self._gate = self._gate.on_sent(wanted, really, now_ns)
             self._gate_log.sent(now_ns, really)
 
     def _take_base(self, now_ns: int) -> None:
-        changes: dict[str, Any] = {}
-        pose_seq, odometry_seq = self._record.pose_seq, self._record.odometry_seq
-        for sample in self._base.drain():
-            value, at_ns = sample.value, sample.received_ns
-            changes["newest_inbound_ns"] = at_ns
+        samples = self._base.drain()
+        for sample in samples:
             self._gate_log.inbound(sample)
-            if isinstance(value, BasePose):
-                pose_seq += 1
-                changes.update(pose=value.pose, pose_valid=value.valid, pose_received_ns=at_ns)
-            elif isinstance(value, BaseOdometry):
-                odometry_seq += 1
-                changes.update(odometry=value.twist, odometry_received_ns=at_ns)
-                self._gate = gate.on_speed(self._gate_limits, self._gate, value.twist)
-            elif isinstance(value, BaseReport):
-                changes.update(status=value.status, status_received_ns=at_ns)
-        self._record = replace(
-            self._record,
-            **changes,
-            pose_seq=pose_seq,
-            odometry_seq=odometry_seq,
-            accepted_seq=self._gate.seq,
-            latched=self._gate.latch != gate.Latch.NONE,
-            latch_cause=int(self._gate.latch),
-            verdict=int(self._gate.latch),
-            published_ns=now_ns,
+        # Nothing is pinged here: there is no bridge that could answer.
+        self._gate = self._gate.on_samples(samples).on_publish(
+            now_ns, newest_inbound_ns=self._base.newest_inbound_ns, newest_pong_ns=0
         )
 
 

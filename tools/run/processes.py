@@ -19,7 +19,6 @@ import contextlib
 import os
 import platform
 import socket
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,14 +26,12 @@ import msgspec
 from msgspec.structs import replace
 
 from robot_io.clock import wall_offset_ns
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES
-from robot_io.ipc.base_record import BASE_RECORD_BYTES
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.spawn import Child, spawn
 from robot_io.rig.config import RigConfig, rig_to_toml
-from robot_io.ur10.driver import spawn_child
-from safety.gate import GateLimits
+from robot_io.ur10.driver import spawn_arm
+from robot_io.ur10.job import ArmJob
 from safety.gate_process import GateJob
 from safety.settings import SafetySettings
 from tools.places.saved_tare import SavedTare
@@ -97,8 +94,8 @@ class Processes:
         config_text: the resolved rig, for the log.
         """
         rig = self._with_endpoints()
-        arm = SharedRecord.create("arm", ARM_RECORD_BYTES)
-        base = SharedRecord.create("base", BASE_RECORD_BYTES)
+        arm = TypedRecord.create("arm", ARM_RECORD)
+        base = TypedRecord.create("base", BASE_RECORD)
         control_end, gate_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         operator_read, self._operator_fd = os.pipe()
         os.set_blocking(self._operator_fd, False)
@@ -114,8 +111,8 @@ class Processes:
             os.close(write_end)
         for ring in self._rings.values():
             ring.close()
-        for record in (arm, base):
-            record.close()
+        arm.close()
+        base.close()
         return ["recorder", "gate", "arm", "control"]
 
     def tell_control(self, key: bytes) -> None:
@@ -160,25 +157,14 @@ class Processes:
         self._spawn("recorder", "tools.run.recorder", job, [*(ring.fd for ring in rings), *alive])
 
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
-        limits = GateLimits.of(SafetySettings.of(rig))
+        limits = SafetySettings.of(rig).envelope
         ring_fd = self._rings["gate"].fd
         job = GateJob(rig.base, rig.frames, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns)
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
-        status = os.pipe()
-        stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it
-        process = spawn_child(
-            rig.arm.host,
-            hold=rig.arm.hold,
-            record_fd=record_fd,
-            status_fd=status[1],
-            held_pose_rad=rig.arm.held_pose_rad,
-            held_pose_tolerance_rad=rig.arm.held_pose_tolerance_rad,
-            stderr=stderr,
-        )
-        os.close(status[1])
-        self._adopt(Child("arm", process, status[0], stderr))
+        pose, tolerance_rad = rig.arm.held_pose_rad, rig.arm.held_pose_tolerance_rad
+        self._adopt(spawn_arm(ArmJob(rig.arm.host, rig.arm.hold, record_fd, os.getpid(), pose, tolerance_rad)))
 
     def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:
         ring_fd, alive_fd = self._rings["control"].fd, self._alive["control"][1]

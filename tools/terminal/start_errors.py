@@ -17,10 +17,7 @@ class Failure(NamedTuple):
     """What one process said."""
 
     name: str
-    code: int
-    what: str
-    where: str
-    do: str
+    error: PushError
 
 
 def combined(failed: list[Child]) -> PushError:
@@ -30,13 +27,13 @@ def combined(failed: list[Child]) -> PushError:
     """
     found = [failure for child in failed for failure in _failures(child)]
     found.sort(key=lambda failure: ORDER.index(failure.name) if failure.name in ORDER else len(ORDER))
-    codes = {failure.code for failure in found}
+    codes = {error.exit_code for _, error in found}
     kind = KINDS.get(codes.pop(), PushError) if len(codes) == 1 else DeviceError
     if len(found) == 1:
-        only = found[0]
-        return kind(only.what, where=_named(only.name, only.where), do=only.do)
-    what = "; ".join(f"{_named(failure.name, failure.where)}: {failure.what}" for failure in found)
-    do = "; ".join(f"{_device(failure.name)}: {failure.do}" for failure in found if failure.do)
+        name, only = found[0]
+        return kind(only.what, where=_named(name, only.where), do=only.do)
+    what = "; ".join(f"{_named(name, error.where)}: {error.what}" for name, error in found)
+    do = "; ".join(f"{_device(name)}: {error.do}" for name, error in found if error.do)
     return kind(what, do=do)
 
 
@@ -47,20 +44,10 @@ def not_in_time(waiting: list[Child]) -> DeviceError:
 
 
 def _failures(child: Child) -> list[Failure]:
-    said = [
-        Failure(
-            child.name,
-            int(error.get("code", EnvironmentFault.exit_code)),
-            str(error.get("what", "")),
-            str(error.get("where", "")),
-            str(error.get("do", "")),
-        )
-        for error in child.errors
-    ]
-    if said:
-        return said
+    if child.errors:
+        return [Failure(child.name, error) for error in child.errors]
     do = f"This is a defect of the program; all it said is in {child.keep_words()}" if child.last_words() else ""
-    return [Failure(child.name, PushError.exit_code, f"its process {child.how_it_ended()}", "", do)]
+    return [Failure(child.name, PushError(f"its process {child.how_it_ended()}", do=do))]
 
 
 def _device(name: str) -> str:
