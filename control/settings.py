@@ -55,7 +55,7 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
             rig.path.expected_contact_m,
             max(rig.control.ramp_s, rig.control.push_speed_m_per_s / rig.limits.max_acceleration_m_per_s2),
             1.0 / rig.loop.rate_hz,
-            round(rig.ft.declared.rate_hz * rig.ft.tare_seconds_s),
+            round(rig.ft.declared.rate_hz * rig.ft.tare_s),
             max(1, round(rig.control.contact_samples * rig.ft.declared.rate_hz / CONTACT_RATE_HZ)),
             in_contact,
         )

@@ -39,9 +39,9 @@ def check(
     if not all(math.isfinite(v) for v in (*joints.position, *joints.velocity)):
         return state, [*faults, "F29"]
     drift = max(abs(q - held) for q, held in zip(joints.position, control.held_joints, strict=True))
-    if drift > settings.hold_stop:
+    if drift > settings.drift_stop:
         faults.append("F20-stop")
-    elif drift > settings.hold_slow:
+    elif drift > settings.drift_hold:
         faults.append("F20-hold")
     if any(abs(q - p) > settings.held_pose_tolerance for q, p in zip(joints.position, settings.held_pose, strict=True)):
         faults.append("R04")

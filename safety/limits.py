@@ -25,8 +25,8 @@ CEILINGS = (
     Ceiling("limits.max_acceleration_m_per_s2", 2.5, "what the Ridgeback's own controller allows"),
     Ceiling("limits.max_yaw_acceleration_rad_per_s2", 1.0, "what the Ridgeback's own controller allows"),
     Ceiling("limits.max_heading_error_deg", 20.0, "the force is rotated by the heading"),
-    Ceiling("limits.hold_slow_rad", 0.01, "0.01 rad at 1 m reach is 1 cm at the contact"),
-    Ceiling("limits.hold_stop_rad", 0.02, "the arm's own limit at rest is 0.05 rad"),
+    Ceiling("limits.drift_hold_rad", 0.01, "0.01 rad at 1 m reach is 1 cm at the contact"),
+    Ceiling("limits.drift_stop_rad", 0.02, "the arm's own limit at rest is 0.05 rad"),
 )
 
 MAX_SPEED_M_PER_S = 0.75
@@ -49,8 +49,8 @@ def check(rig: RigConfig) -> None:
             problems.append(f"{ceiling.key} = {value:g} is above the ceiling of {ceiling.value:g} ({ceiling.reason})")
     if rig.limits.slow_force_N >= rig.limits.max_force_N:
         problems.append("limits.slow_force_N must be below limits.max_force_N")
-    if rig.limits.hold_slow_rad >= rig.limits.hold_stop_rad:
-        problems.append("limits.hold_slow_rad must be below limits.hold_stop_rad")
+    if rig.limits.drift_hold_rad >= rig.limits.drift_stop_rad:
+        problems.append("limits.drift_hold_rad must be below limits.drift_stop_rad")
     if rig.control.force_min_N >= rig.limits.slow_force_N:
         problems.append("control.force_min_N must be below limits.slow_force_N")
     if rig.sliders.shortest_m > rig.sliders.longest_m:

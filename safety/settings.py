@@ -33,8 +33,8 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     held_pose: Joints
     """Where the arm must be, rad: the frames of the rig are those of this pose."""
     held_pose_tolerance: float
-    hold_slow: float
-    hold_stop: float
+    drift_hold: float
+    drift_stop: float
     servo: bool
     max_heading_error: float
     pose_period_ns: int
@@ -57,8 +57,8 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
             rig.ft.noise[0] > 0.0,
             rig.arm.held_pose_rad,
             rig.arm.held_pose_tolerance_rad,
-            limits.hold_slow_rad,
-            limits.hold_stop_rad,
+            limits.drift_hold_rad,
+            limits.drift_stop_rad,
             rig.arm.hold == "servo",
             math.radians(limits.max_heading_error_deg),
             round(1e9 / rig.base.pose_rate_hz),

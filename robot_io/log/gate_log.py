@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from robot_io.log.channels import CHANNELS, Kind
-from robot_io.log.messages import GateDecision, SafetyEvent
+from robot_io.log.messages import GATE_SAYS, GateDecision, SafetyEvent
 from robot_io.log.ros_messages import (
     BASE_FRAME,
     UNKNOWN_COVARIANCE,
@@ -60,7 +60,7 @@ class GateLog:
         if fault:
             stop = int(Mode.STOP)
             self._push(
-                Kind.SAFETY_EVENT, now_ns, SafetyEvent(header, tick, "fault", fault, f"gate: {text}", stop, stop)
+                Kind.SAFETY_EVENT, now_ns, SafetyEvent(header, tick, "fault", fault, f"{GATE_SAYS}{text}", stop, stop)
             )
 
     def _header(self, at_ns: int, frame: str) -> Header:

@@ -45,7 +45,7 @@ class FtConfig(Table, frozen=True):
     """A shipped kind, or `package.module:Class` on the Python path or beside the rig file (docs/add-a-device.md)."""
     level: Level = "emulated"
     port: str = ""
-    tare_seconds_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
+    tare_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
     """How long the tare is averaged."""
     noise_force_N: NonNegative | None = None
     """Noise of the sensor, one standard deviation of a force axis; without it what the kind declares (FT 300: 1.2)."""
@@ -182,9 +182,9 @@ class LimitsConfig(Table, frozen=True):
     max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
     max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
     """Turned away this far from its heading at the start, the base stops (F44)."""
-    hold_slow_rad: Positive = 0.005
+    drift_hold_rad: Positive = 0.005
     """Drift of an arm joint at which the base holds ..."""
-    hold_stop_rad: Positive = 0.01
+    drift_stop_rad: Positive = 0.01
     """... and at which it stops (F20)."""
 
 
