@@ -82,11 +82,11 @@ def _rested(state: ControlState, now_ns: int, for_ns: int) -> bool:
     return state.rest_since_ns > 0 and now_ns - max(state.rest_since_ns, state.phase_since_ns) >= for_ns
 
 
-def everyone_spoke(state: ControlState, inp: TickInput) -> bool:
+def everyone_spoke(settings: Settings, state: ControlState, inp: TickInput) -> bool:
     """Tell whether every device has given enough fresh data to start."""
     arm, base = inp.arm, inp.base
     return (
-        inp.ft.packets_ok >= SETTLE_PACKETS
+        inp.ft.packets_ok >= settings.settle_readings
         and inp.now_ns - state.last_reading_ns <= FRESH_NS
         and arm.link == LinkState.UP
         and arm.packets >= SETTLE_PACKETS
@@ -100,7 +100,7 @@ def everyone_spoke(state: ControlState, inp: TickInput) -> bool:
 
 
 def _settle(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
-    if not everyone_spoke(state, inp):
+    if not everyone_spoke(settings, state, inp):
         return state
     held = replace(state, held_yaw=inp.base.pose.yaw, approach_from_m=along)
     if settings.in_contact:

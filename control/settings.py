@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from control.tare import SMALLEST_COUNT
 from robot_io.geometry import StraightPath
 from robot_io.messages import Vector6
 from robot_io.rig.config import ControlConfig, RigConfig
@@ -11,6 +12,7 @@ from robot_io.rig.types import Matrix3
 
 CONTACT_RATE_HZ = 100.0
 """`contact_samples` counts readings at this rate."""
+SETTLE_S = 0.2
 
 
 class Settings(msgspec.Struct, frozen=True, gc=False):
@@ -35,6 +37,8 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     """Period of the loop, s."""
     tare_readings: int
     """How many readings a tare needs, at the rate that the sensor declares."""
+    settle_readings: int
+    """How many readings the sensor must have given before anything begins."""
     contact_readings: int
     """How many readings in a row above the threshold are contact."""
     in_contact: bool
@@ -56,6 +60,7 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
             max(rig.control.ramp_s, rig.control.push_speed_m_per_s / rig.limits.max_acceleration_m_per_s2),
             1.0 / rig.loop.rate_hz,
             round(rig.ft.declared.rate_hz * rig.ft.tare_s),
+            max(SMALLEST_COUNT, round(SETTLE_S * rig.ft.declared.rate_hz)),
             max(1, round(rig.control.contact_samples * rig.ft.declared.rate_hz / CONTACT_RATE_HZ)),
             in_contact,
         )

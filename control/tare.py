@@ -93,7 +93,7 @@ def judge(sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vec
         unit = UNITS[i]
         if not math.isfinite(bias[i]):
             return Judgement(result, Refusal.UNSETTLED, f"{name} is {bias[i]}", "Check the sensor")
-        sd, most = moments[i][1], NOISE_FACTOR * noise[i]
+        sd, most = moments[i][1], NOISE_FACTOR * max(noise[i], resolution[i] / 2)
         if not sd <= most:
             what = f"{name} is not settled: it varies by {sd:.3g} {unit} (at most {most:.3g})"
             return Judgement(result, Refusal.UNSETTLED, what, wait)

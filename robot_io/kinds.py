@@ -13,7 +13,8 @@ import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from robot_io.errors import ConfigError
+from robot_io.errors import ConfigError, DeviceError, PushError
+from robot_io.messages import DeviceInfo
 
 SHIPPED: dict[str, dict[str, str]] = {
     "ft": {"robotiq-ft300": "robot_io.ft300.driver:Ft300"},
@@ -29,6 +30,9 @@ PARTS_OF = {
     "base": (*PARTS, "fileno", "command"),
 }
 """What a run calls of a driver; a class that lacks one is refused before anything is opened."""
+ATTRIBUTES_OF = {"base": ("before_close", "sent_ns", "newest_inbound_ns", "newest_pong_ns")}
+"""What a run reads of a driver that was built."""
+PAGE = "docs/add-a-device.md shows what a driver needs"
 
 
 def find_kind(device: str, kind: str, folder: str = "") -> type[Any]:
@@ -60,8 +64,44 @@ def find_kind(device: str, kind: str, folder: str = "") -> type[Any]:
     missing = [part for part in PARTS_OF[device] if not hasattr(found, part)]
     if not isinstance(found, type) or missing:
         what = f"lacks `{'`, `'.join(missing)}`" if isinstance(found, type) else "is not a class"
-        raise ConfigError(f"`{kind}` {what}", where=where, do="docs/add-a-device.md shows what a driver needs")
+        raise ConfigError(f"`{kind}` {what}", where=where, do=PAGE)
     return found
+
+
+def build_driver(device: str, kind: str, address: str, options: Mapping[str, Any], *, folder: str = "") -> Any:
+    """Return the driver of a kind, not yet open: what `from_rig` makes of the rig's address and options.
+
+    Raises ConfigError as `find_kind`; for whatever else somebody else's `from_rig` raises; for a missing attribute.
+    """
+    found = find_kind(device, kind, folder)
+    with _blamed(kind, ConfigError, shipped=kind in SHIPPED[device]):
+        driver = found.from_rig(address, options)
+    missing = [name for name in ATTRIBUTES_OF.get(device, ()) if not hasattr(driver, name)]
+    if missing:
+        raise ConfigError(f"`{kind}` lacks `{'`, `'.join(missing)}`", where=f"{device}.kind", do=PAGE)
+    return driver
+
+
+def started(driver: Any, device: str, kind: str) -> DeviceInfo:
+    """Open and start a driver; return its identity. Raises DeviceError, also for whatever else it raises."""
+    with _blamed(kind, DeviceError, shipped=kind in SHIPPED[device]):
+        info: DeviceInfo = driver.open()
+        driver.start()
+    return info
+
+
+@contextlib.contextmanager
+def _blamed(kind: str, as_error: type[PushError], *, shipped: bool) -> Iterator[None]:
+    """Turn what somebody else's driver raises and should not into an error that names it."""
+    try:
+        yield
+    except PushError:
+        raise
+    except Exception as error:
+        if shipped:  # then it is a defect of this program
+            raise
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise as_error(f"its driver failed: {reason}", where=kind, do="Mend the driver") from error
 
 
 @contextlib.contextmanager
@@ -72,10 +112,9 @@ def open_device(
 
     Raises ConfigError as `find_kind`, and what the driver's `open` and `start` raise.
     """
-    driver = find_kind(device, kind, folder).from_rig(address, options or {})
+    driver = build_driver(device, kind, address, options or {}, folder=folder)
     try:
-        driver.open()
-        driver.start()
+        started(driver, device, kind)
         yield driver
     finally:
         try:

@@ -26,7 +26,7 @@ from robot_io.ipc.process import lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.record import BASE_RECORD, TypedRecord
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
-from robot_io.kinds import find_kind
+from robot_io.kinds import build_driver, started
 from robot_io.log.gate_log import GateLog
 from robot_io.rig.config import BaseConfig, FramesConfig
 from safety.envelope import EnvelopeLimits
@@ -123,7 +123,9 @@ class GateProcess:
             self._shell = self._shell.on_control_gone(monotonic_ns())
 
     def _take(self) -> None:
-        samples = self._base.drain()
+        samples, now_ns = self._base.drain(), monotonic_ns()
+        if any(sample.received_ns > now_ns for sample in samples):  # it would never grow old
+            samples = tuple(replace(sample, received_ns=min(sample.received_ns, now_ns)) for sample in samples)
         for sample in samples:
             self._log.inbound(sample)
         if samples:
@@ -165,7 +167,9 @@ def main() -> int:
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=GateJob)
     status = StatusPipe(job.status_fd)
     try:
-        base: Base = find_kind("base", job.base.kind, job.kind_folder).from_rig(
+        base: Base = build_driver(
+            "base",
+            job.base.kind,
             job.base.url,
             {
                 "topics": job.base.topics,
@@ -173,9 +177,9 @@ def main() -> int:
                 "base_from_marker": job.frames.base_from_marker,
                 **job.base.options,
             },
+            folder=job.kind_folder,
         )
-        info = base.open()
-        base.start()
+        info = started(base, "base", job.base.kind)
     except PushError as error:  # the process ends, and with it whatever was open
         status.error(error)
         return error.exit_code

@@ -33,9 +33,13 @@ class SavedTare(msgspec.Struct, frozen=True):
 def power_cycle(rig: RigConfig) -> str:
     """Return what stands for the sensor's power cycle."""
     if rig.ft.level == "hardware":
-        return f"{rig.ft.port} {Path('/proc/sys/kernel/random/boot_id').read_text().strip()}"
-    parts = msgspec.json.encode((rig.world.sensor, rig.frames, rig.arm.held_pose_rad))
-    return hashlib.sha256(parts).hexdigest()
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        return f"{rig.ft.port} {boot} {_digest((rig.ft.kind, rig.ft.options, rig.ft.declared))}"
+    return _digest((rig.ft.kind, rig.ft.options, rig.ft.declared, rig.world.sensor, rig.frames, rig.arm.held_pose_rad))
+
+
+def _digest(parts: object) -> str:
+    return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
 
 
 def save(rig: RigConfig, bias: Vector6, joints: Vector6) -> None:

@@ -14,12 +14,12 @@ import msgspec
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.driver import Driver
-from robot_io.errors import PushError
+from robot_io.errors import DeviceUnreachable, PushError
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.ipc.status import StatusPipe
-from robot_io.kinds import find_kind
-from robot_io.messages import ArmRecord, JointState, LinkState
+from robot_io.kinds import build_driver, started
+from robot_io.messages import ArmRecord, ArmState, JointState, LinkState
 from robot_io.rig.config import rig_from_toml
 from tools.run.jobs import ArmKindJob
 
@@ -44,11 +44,9 @@ def main() -> int:
     asked: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: asked.append(number))
     try:
-        driver: Driver[JointState] = find_kind("arm", arm.kind, job.kind_folder).from_rig(
-            arm.host, shared | arm.options
-        )
-        info = driver.open()
-        driver.start()
+        options = shared | arm.options
+        driver: Driver[JointState] = build_driver("arm", arm.kind, arm.host, options, folder=job.kind_folder)
+        info = started(driver, "arm", arm.kind)
     except PushError as error:
         status.error(error)
         return error.exit_code
@@ -57,8 +55,14 @@ def main() -> int:
     record = TypedRecord(job.record_fd, ARM_RECORD)
     newest = ArmRecord(child_pid=os.getpid())
     try:
-        while not asked and newest.link != LinkState.LOST:
+        while not asked:
             newest = publish(driver, record, newest, servo=arm.hold == "servo")
+            if newest.link == LinkState.LOST:
+                lost = DeviceUnreachable(
+                    driver.health().cause or "its link is gone", where=arm.host, do="Look at the arm"
+                )
+                status.error(lost)
+                return lost.exit_code
             time.sleep(PERIOD_NS / NS_PER_S)
     finally:
         driver.stop()
@@ -68,13 +72,14 @@ def main() -> int:
 
 def publish(driver: Driver[JointState], record: TypedRecord[ArmRecord], before: ArmRecord, *, servo: bool) -> ArmRecord:
     """Publish the newest state of the driver, also when there is no new one; return it."""
-    samples, link = driver.drain(), driver.health().state
+    samples, link, now_ns = driver.drain(), driver.health().state, monotonic_ns()
     newest = before
     if samples:
         sample = samples[-1]
-        newest = msgspec.structs.replace(before, joints=sample.value, packets=sample.seq, changed_ns=sample.received_ns)
-    holds = servo and link == LinkState.UP
-    newest = msgspec.structs.replace(newest, link=int(link), servo=holds, published_ns=monotonic_ns())
+        arrived = min(sample.received_ns, now_ns)  # a stamp from the future would never grow old
+        newest = msgspec.structs.replace(before, joints=sample.value, packets=sample.seq, changed_ns=arrived)
+    holds = servo and link == LinkState.UP and newest.joints.state == ArmState.HOLDING
+    newest = msgspec.structs.replace(newest, link=int(link), servo=holds, published_ns=now_ns)
     record.publish(newest)
     return newest
 

@@ -20,7 +20,7 @@ from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
-from robot_io.kinds import find_kind
+from robot_io.kinds import build_driver, started
 from robot_io.rig.config import rig_from_toml
 from robot_io.ur10.driver import ArmLink
 from tools.kinds import name_of
@@ -56,7 +56,7 @@ def main() -> int:
     rig = rig_from_toml(job.rig_toml)
     logging.getLogger().addHandler(DriverWarnings(status, name_of(rig.ft.kind)))
     try:
-        sensor: Sensor = find_kind("ft", rig.ft.kind, job.kind_folder).from_rig(rig.ft.port, rig.ft.options)
+        sensor: Sensor = build_driver("ft", rig.ft.kind, rig.ft.port, rig.ft.options, folder=job.kind_folder)
     except PushError as error:
         status.error(error)
         return error.exit_code
@@ -79,8 +79,7 @@ def main() -> int:
     )
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     try:
-        info = sensor.open()
-        sensor.start()
+        info = started(sensor, "ft", rig.ft.kind)
         signal.signal(signal.SIGTERM, lambda *_: loop.stop_requested())
     except PushError as error:
         sensor.close()

@@ -123,7 +123,7 @@ class Lockstep:
             now_ns,
             int(operator),
             HostInput(0, 0, True, True, True, False, 0),
-            ft_input(readings, self._ft.health()),
+            ft_input(readings, self._ft.health(), 0),
             self._arm.read() or ArmRecord(),
             self._gate.record,
         )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from robot_io.log.mcap_read import read_log
+from robot_io.tick import TICK_CDR
 from tests.push_runs import QUICK, started
 
 OWN = Path(__file__).with_name("own_devices.py")
@@ -124,6 +127,108 @@ def test_a_kind_that_cannot_be_used_is_one_sentence_and_opens_nothing(folder, ki
     assert len(done.err.splitlines()) == 1, done.err
     assert not (folder / "out").exists()
     assert done.last_object["error"]["code"] == 2
+
+
+SENSORS = """
+import time
+from udp_sensor import UdpSensor
+from msgspec.structs import replace
+class Constructor(UdpSensor):
+    @classmethod
+    def from_rig(cls, address, options):
+        raise TypeError("planted")
+class Opening(UdpSensor):
+    def open(self):
+        raise OSError("planted")
+class Draining(UdpSensor):
+    def drain(self):
+        if self.packets_ok > 2500:
+            raise ZeroDivisionError("planted")
+        return super().drain()
+class Uncounted(UdpSensor):
+    def health(self):
+        return replace(super().health(), counters={})
+class Ahead(UdpSensor):
+    def drain(self):
+        samples = super().drain()
+        if self.packets_ok > 2500:
+            return ()
+        return tuple(replace(s, received_ns=s.received_ns + 3_000_000_000) for s in samples)
+class WallClock(UdpSensor):
+    def drain(self):
+        return tuple(replace(s, received_ns=time.time_ns()) for s in super().drain())
+"""
+
+
+@pytest.fixture
+def sensors(folder):
+    page = (OWN.parents[3] / "docs/add-a-device.md").read_text(encoding="utf-8")
+    for name, code in zip(("udp_sensor", "udp_emulator"), re.findall(r"```python\n(.*?)```", page, re.S), strict=True):
+        (folder / f"{name}.py").write_text(code, encoding="utf-8")
+    (folder / "sensors.py").write_text(SENSORS, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "says"),
+    [
+        ("Constructor", 2, "its driver failed: TypeError: planted"),
+        ("Opening", 4, "its driver failed: OSError: planted"),
+    ],
+)
+def test_what_a_driver_should_not_raise_names_the_driver(sensors, kind, code, says):
+    done = push(sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--out", "out", "--json")
+    assert done.code == code, done.err
+    assert says in done.last_object["error"]["what"]
+    assert f"sensors:{kind}" in done.err
+    assert "defect of the program" not in done.err
+
+
+def test_a_driver_that_raises_in_mid_push_stops_it_and_the_log_says_so(sensors):
+    done = push(
+        sensors, "run", "emulated", "--set", "ft.kind=sensors:Draining", "--distance-m", "2", "--out", "out", "--json",
+        *QUICK,
+    )  # fmt: skip
+    assert done.code != 0
+    assert "F68" in done.last_object["faults"]
+    assert "ZeroDivisionError: planted" in " ".join(done.last_object["notes"])
+    assert push(sensors, "replay", "out").code == 0
+
+
+@pytest.mark.parametrize("kind", ["Uncounted", "WallClock"])
+def test_a_driver_that_counts_nothing_or_stamps_by_the_wall_clock_still_pushes(sensors, kind):
+    done = push(
+        sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--distance-m", "0.1", "--out", "out", "--json",
+        *QUICK,
+    )  # fmt: skip
+    assert (done.code, done.last_object["verdict"]) == (0, "done"), done.err
+    assert push(sensors, "replay", "out").code == 0
+
+
+def test_stamps_from_the_future_do_not_hide_a_silent_sensor(sensors):
+    """Silent after two and a half seconds, while it pushes: within 160 ms the run stops, not three seconds later."""
+    done = push(
+        sensors, "run", "emulated", "--set", "ft.kind=sensors:Ahead", "--distance-m", "2", "--out", "out", "--json",
+        *QUICK,
+    )  # fmt: skip
+    assert done.code == 5, done.err
+    assert "F01-stop" in done.last_object["fault_counts"]
+    log = read_log(sensors / "out" / "run.mcap")
+    ticks = [TICK_CDR.decode(message.data) for message in log if message.topic == "/control/tick"]
+    newest_ns = max(reading.received_ns for tick in ticks for reading in tick.input.ft.readings)
+    stopped_ns = min(tick.input.now_ns for tick in ticks if "F01-stop" in tick.output.faults)
+    assert 0 < stopped_ns - newest_ns < 200_000_000
+
+
+def test_a_base_without_its_attributes_is_refused(folder):
+    (folder / "bare.py").write_text(
+        "from own_devices import Base\nclass Bare(Base):\n    def __init__(self, address):\n"
+        "        super().__init__(address)\n        del self.sent_ns\n",
+        encoding="utf-8",
+    )
+    done = push(folder, "run", "emulated", "--set", "base.kind=bare:Bare", "--out", "out", "--json")
+    assert done.code == 2, done.err
+    assert "lacks `sent_ns`" in done.err
 
 
 @pytest.mark.parametrize("device", ["arm=own_devices:Arm", "base=own_devices:Base"])
