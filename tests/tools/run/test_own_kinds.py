@@ -214,7 +214,7 @@ def test_stamps_from_the_future_do_not_hide_a_silent_sensor(sensors):
     assert done.code == 5, done.err
     assert "F01-stop" in done.last_object["fault_counts"]
     log = read_log(sensors / "out" / "run.mcap")
-    ticks = [TICK_CDR.decode(message.data) for message in log if message.topic == "/control/tick"]
+    ticks = [TICK_CDR.decode(message.payload) for message in log if message.topic == "/control/tick"]
     newest_ns = max(reading.received_ns for tick in ticks for reading in tick.input.ft.readings)
     stopped_ns = min(tick.input.now_ns for tick in ticks if "F01-stop" in tick.output.faults)
     assert 0 < stopped_ns - newest_ns < 200_000_000
