@@ -17,6 +17,7 @@ from robot_io.errors import ConfigError, PushError
 from robot_io.ipc.spawn import spawn
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import SHIPPED, find_kind
+from robot_io.rig.config import RigConfig
 
 ANSWER_WITHIN_S = 20.0
 
@@ -44,6 +45,11 @@ SHORT_NAMES = {"robotiq-ft300": "ft300", "ur": "ur10", "ridgeback-rosbridge": "r
 def name_of(kind: str) -> str:
     """Return what a device of this kind is called in messages and summaries."""
     return SHORT_NAMES.get(kind, kind)
+
+
+def device_names(rig: RigConfig) -> tuple[str, str, str]:
+    """Return what the sensor, the arm and the base of a rig are called."""
+    return name_of(rig.ft.kind), name_of(rig.arm.kind), name_of(rig.base.kind)
 
 
 def is_shipped(device: str, kind: str) -> bool:

@@ -22,6 +22,7 @@ from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.log.mcap_read import read_summary
 from robot_io.rig.config import rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick
+from tools.kinds import device_names
 from tools.log.tick_topics import TickTopics
 from tools.rig import resolve_rig
 from tools.run.lockstep import Lockstep, open_log
@@ -122,7 +123,7 @@ def parts(folder: Path) -> dict[str, float]:
             TICK_CDR.encode(tick)
 
     def derive() -> None:
-        topics = TickTopics(0)
+        topics = TickTopics(0, device_names(rig))
         for tick in ticks:
             topics.expand(tick)
 

@@ -10,6 +10,7 @@ from robot_io.error_report import exit_code_matters_more, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
+from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
 from tools.places.saved_tare import SavedTare
 from tools.places.state_dir import RigLock
@@ -112,14 +113,15 @@ def announce(rig: RigConfig) -> None:
 
 def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
     """Show what would run."""
+    sensor, arm, base = device_names(rig)
     facts = {
         "schema": 1,
         "dry_run": True,
         "rig": rig.name,
         "devices": {
-            "ft300": {"level": rig.ft.level, "port": rig.ft.port},
-            "ur10": {"level": rig.arm.level, "host": rig.arm.host, "hold": rig.arm.hold},
-            "ridgeback": {"level": rig.base.level, "url": rig.base.url},
+            sensor: {"level": rig.ft.level, "port": rig.ft.port},
+            arm: {"level": rig.arm.level, "host": rig.arm.host, "hold": rig.arm.hold},
+            base: {"level": rig.base.level, "url": rig.base.url},
         },
         "distance_m": rig.control.distance_m,
         "controller": rig.control.controller,

@@ -9,6 +9,7 @@ from robot_io.log.ros_messages import POSE_STAMPED, planar_pose
 from robot_io.log.world_messages import WorldState
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick
+from tools.kinds import device_names
 from tools.log.scene_topics import scene_messages, slider_frame, slider_pose
 from tools.log.tick_topics import Message, TickTopics
 
@@ -22,7 +23,7 @@ class Derivation:
 
     def __init__(self, rig: RigConfig, wall_offset_ns: int) -> None:
         self._rig = rig
-        self._topics = TickTopics(wall_offset_ns)
+        self._topics = TickTopics(wall_offset_ns, device_names(rig))
         # With motion capture of the object its pose is what was seen, else it is the world's truth.
         self.slider_is_seen = bool(rig.base.topics.slider_pose)
 

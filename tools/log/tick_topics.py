@@ -66,8 +66,10 @@ def message(topic: str, log_time_ns: int, value: Any) -> Message:
 class TickTopics:
     """Derives the other topics from ticks that come in order; remembers only what was said last."""
 
-    def __init__(self, wall_offset_ns: int) -> None:
+    def __init__(self, wall_offset_ns: int, names: tuple[str, str, str]) -> None:
+        """names: what the sensor, the arm and the base are called."""
         self._offset_ns = wall_offset_ns
+        self._names = names
         self._faults: tuple[str, ...] = ()
         self._arm_packets = 0
         self._pose_seq = 0
@@ -94,7 +96,7 @@ class TickTopics:
         messages += self._events(tick, header, now_ns)
         if self._diagnosed_ns is None or inp.now_ns - self._diagnosed_ns >= NS_PER_S:
             self._diagnosed_ns = inp.now_ns
-            messages.append(message("/diagnostics", now_ns, _diagnostics(tick, header)))
+            messages.append(message("/diagnostics", now_ns, _diagnostics(tick, header, self._names)))
         return messages
 
     def _raw_wrench(self, reading: FtReading) -> Message:
@@ -155,17 +157,24 @@ def _arm_state(number: int) -> str:
     return _ARM_STATES.get(number, str(number))
 
 
-def _diagnostics(tick: ControlTick, header: Header) -> DiagnosticArray:
+def _diagnostics(tick: ControlTick, header: Header, names: tuple[str, str, str]) -> DiagnosticArray:
+    sensor_name, arm_name, base_name = names
     ft, arm, base, host = tick.input.ft, tick.input.arm, tick.input.base, tick.input.host
     arm_up = arm.link == LinkState.UP and not arm.error
     base_up = base.pose_valid and not base.latched
     return DiagnosticArray(
         header,
         (
-            _status("ft300", ft.link == LinkState.UP, packets=ft.packets_ok, crc_fail=ft.crc_fail, junk=ft.junk_bytes),
-            _status("ur10", arm_up, packets=arm.packets, error=arm.error, state=_arm_state(arm.joints.state)),
             _status(
-                "ridgeback",
+                sensor_name,
+                ft.link == LinkState.UP,
+                packets=ft.packets_ok,
+                crc_fail=ft.crc_fail,
+                junk=ft.junk_bytes,
+            ),
+            _status(arm_name, arm_up, packets=arm.packets, error=arm.error, state=_arm_state(arm.joints.state)),
+            _status(
+                base_name,
                 base_up and not base.status.stop_engaged,
                 battery_v=round(base.status.battery_v, 2),
                 stop_engaged=base.status.stop_engaged,

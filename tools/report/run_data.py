@@ -76,7 +76,7 @@ class RunData:
     skipped: int
     skips: list[tuple[float, int]]
     ages: dict[str, Tally]
-    """How old each device's newest data was at each kept tick: ft300, ur10, ridgeback."""
+    """How old each device's newest data was at each kept tick: ft, arm, base."""
     faults: list[Span]
     modes: list[Span]
     first: ControlTick | None
@@ -125,7 +125,7 @@ class _Reader:
         self._late = Tally()
         self._skipped = 0
         self._skips: list[tuple[float, int]] = []
-        self._ages = {"ft300": Tally(), "ur10": Tally(), "ridgeback": Tally()}
+        self._ages = {"ft": Tally(), "arm": Tally(), "base": Tally()}
         self._last_reading_ns = 0
         self._faults = Spans()
         self._modes = Spans()
@@ -230,9 +230,9 @@ class _Reader:
             self._last_reading_ns = tick.input.ft.readings[-1].received_ns
         now_ns = tick.input.now_ns
         for device, at_ns in (
-            ("ft300", self._last_reading_ns),
-            ("ur10", tick.input.arm.changed_ns),
-            ("ridgeback", tick.input.base.pose_received_ns),
+            ("ft", self._last_reading_ns),
+            ("arm", tick.input.arm.changed_ns),
+            ("base", tick.input.base.pose_received_ns),
         ):
             if at_ns:
                 self._ages[device].add((now_ns - at_ns) * 1e-6)

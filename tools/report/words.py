@@ -12,6 +12,7 @@ from control.run_notes import outcome
 from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
 from robot_io.tick import Phase
 from safety.faults import FAULTS
+from tools.kinds import device_names
 from tools.report.bounded_series import Floats
 from tools.report.run_data import RunData
 from tools.report.style import phase_spans
@@ -123,19 +124,19 @@ def timing_rows(run: RunData) -> list[tuple[str, str]]:
 
 def counters(run: RunData, summary: dict[str, Any]) -> dict[str, list[tuple[str, str]]]:
     """Return (counter, value) per device: the drivers' own counts if the summary has them, else the last tick's."""
-    found: dict[str, dict[str, Any]] = {"ft300": {}, "ur10": {}, "ridgeback": {}}
+    sensor, arm_name, base_name = names = device_names(run.rig)
+    found: dict[str, dict[str, Any]] = {name: {} for name in names}
     if run.last is not None:
         ft, arm, base = run.last.input.ft, run.last.input.arm, run.last.input.base
-        found["ft300"] = {"packets_ok": ft.packets_ok, "crc_fail": ft.crc_fail, "junk_bytes": ft.junk_bytes}
-        found["ur10"] = {"packets": arm.packets}
-        found["ridgeback"] = {"pose": base.pose_seq, "odometry": base.odometry_seq}
+        found[sensor] = {"packets_ok": ft.packets_ok, "crc_fail": ft.crc_fail, "junk_bytes": ft.junk_bytes}
+        found[arm_name] = {"packets": arm.packets}
+        found[base_name] = {"pose": base.pose_seq, "odometry": base.odometry_seq}
     told = summary.get("devices")
     for device in found:
         if isinstance(told, dict) and isinstance(told.get(device), dict):
             found[device].update(told[device])
     rows = {}
-    for device, values in found.items():
-        age = run.ages[device]
+    for (device, values), age in zip(found.items(), run.ages.values(), strict=True):
         rows[device] = [(str(name).replace("_", " "), str(value)) for name, value in list(values.items())[:100]]
         if age.total:
             rows[device] += [
