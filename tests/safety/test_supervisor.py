@@ -310,6 +310,19 @@ def test_a_loop_that_skips_every_other_period_still_sees_a_dead_sensor():
     assert n <= 8  # 160 ms at 20 ms a tick
 
 
+def test_a_second_skipping_tick_in_a_row_is_no_pause_any_more():
+    """One pause is forgiven for one tick; where the next tick skips as well, silent devices are held."""
+    bench = paused(30)
+    bench.skip(1)
+    bench.fold(lambda inp, _: replace(EVERYONE_SILENT(inp, 32), host=replace(inp.host, skipped=1)))
+    assert {"F01-hold", "F24-hold", "F31-hold"} <= set(bench.output.faults)
+    assert bench.output.mode == Mode.HOLD
+    bench.skip(1)
+    bench.fold(lambda inp, _: replace(EVERYONE_SILENT(inp, 34), host=replace(inp.host, skipped=1)))
+    assert {"F01-stop", "F24-stop", "F31-stop"} <= set(bench.output.faults)
+    assert bench.output.mode == Mode.STOP
+
+
 # --- a start in the middle of the sensor's rhythm ----------------------------------------------------------------
 
 
