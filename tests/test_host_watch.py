@@ -1,7 +1,11 @@
 """What becomes of a test that this machine keeps from measuring."""
 
+import signal
+from pathlib import Path
+
 import pytest
 
+from tests.faults.kill_rounds import Round, within
 from tests.host_watch import HostStalled, Unmeasured, repeated_when_the_host_stalls
 
 
@@ -10,6 +14,7 @@ def unmeasured(monkeypatch):
     """What the test below adds is not listed as unmeasured itself."""
     own = Unmeasured()
     monkeypatch.setattr("tests.host_watch.UNMEASURED", own)
+    monkeypatch.setattr("tests.faults.kill_rounds.UNMEASURED", own)
     return own
 
 
@@ -60,4 +65,30 @@ def test_any_other_failure_is_not_repeated(tmp_path, unmeasured):
     with pytest.raises(AssertionError):
         measure(tmp_path=tmp_path)
     assert len(folders) == 1
+    assert unmeasured.take() == []
+
+
+def struck(monkeypatch, zero_ms, rest_ms, stall_ms=50.0):
+    """Kill nothing: each round says the same. The bounds are 20 ms for the zero, and 60 ms from there to rest."""
+    found = Round(None, Path(), zero_ms, rest_ms, stall_ms, 500.0, 500.0, 0)
+    monkeypatch.setattr("tests.faults.kill_rounds.strike", lambda *_: found)
+    assert within(Path(), Path(), "gate", signal.SIGKILL, None, zero_ms=20.0, rest_ms=60.0) is found
+
+
+def test_a_round_within_its_bounds_is_measured_however_the_host_did(monkeypatch, unmeasured):
+    struck(monkeypatch, 20.0, 80.0)
+    assert unmeasured.take() == []
+
+
+def test_bounds_that_no_round_could_measure_are_reported_and_the_order_is_judged(monkeypatch, unmeasured):
+    struck(monkeypatch, 99.0, 140.0)
+    assert unmeasured.take() == ["SIGKILL of gate: zero within 20.0 ms, rest within 60.0 ms"]
+    for zero_ms, rest_ms in ((99.0, 90.0), (None, 90.0), (99.0, None)):
+        with pytest.raises(AssertionError):
+            struck(monkeypatch, zero_ms, rest_ms)
+
+
+def test_a_round_that_the_host_did_not_stall_is_judged_by_its_bounds(monkeypatch, unmeasured):
+    with pytest.raises(AssertionError, match="bounds"):
+        struck(monkeypatch, 21.0, 60.0, stall_ms=9.0)
     assert unmeasured.take() == []

@@ -253,6 +253,18 @@ def test_a_pause_of_the_host_is_not_taken_for_dead_devices():
     assert bench.output.faults == ()
 
 
+def test_one_skipped_tick_is_a_pause():
+    """After 20 ms without a tick an arm that was silent for 80 ms is judged by its next chance to speak."""
+    bench = pushing()
+    bench.skip(1)
+    bench.fold(
+        lambda inp, n: replace(old("arm", "published_ns", "changed_ns")(inp, 7), host=replace(inp.host, skipped=1))
+    )
+    assert bench.output.faults == ("F60-late",)
+    bench.fold(lambda inp, n: old("arm", "published_ns", "changed_ns")(inp, 8))
+    assert bench.output.faults == ("F24-hold",)
+
+
 def test_devices_still_silent_a_tick_later_are_held_and_after_that_stopped():
     bench = paused(30)
     bench.fold(lambda inp, _: EVERYONE_SILENT(inp, 31))
