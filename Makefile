@@ -1,6 +1,8 @@
 # `make demo` and `make test` set everything up by themselves, in .venv; nothing else is touched.
 PYTHON ?= python3
 BIN := .venv/bin
+# What the long tests draw from; `make test-all SEED=NUMBER` draws the same again.
+SEED ?= $(shell date +%s)
 DEMO := runs/demo-$(shell date +%Y%m%d-%H%M%S)
 
 .DEFAULT_GOAL := help
@@ -17,7 +19,8 @@ test: check ## set up, check style, types and import rules, run all tests but th
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 test-all: check ## the same with the long tests
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not hardware"
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not hardware" --measure-all \
+		--hypothesis-profile=anew --hypothesis-seed=$(SEED)
 
 check: dev ## ruff, mypy strict and the import contracts, no tests
 	$(BIN)/ruff check .

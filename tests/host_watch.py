@@ -1,7 +1,8 @@
 """Whether the host kept every processor running: one small process on each, at the highest priority it may have.
 
 A test on the wall clock that failed while a processor stood still for long says nothing of the program: it is
-repeated, at most three times, and says so. Nothing else is ever repeated, and no bound is widened.
+repeated, at most three times, and says so. Nothing else is ever repeated, and no bound is widened. What no attempt
+could measure is named at the end of the tests as unmeasured; with `--measure-all`, as in `make test-all`, it fails.
 
     @repeated_when_the_host_stalls
     def test_something(state, tmp_path): ...
@@ -16,6 +17,8 @@ import sys
 import tempfile
 from collections.abc import Callable
 from typing import Any
+
+import pytest
 
 REPEATS = 3
 WATCHER = """
@@ -38,6 +41,28 @@ while True:
 
 class HostStalled(Exception):
     """A run was spoilt by its host."""
+
+
+class Unmeasured:
+    """What the host kept the tests of this process from measuring since it was last taken, in words."""
+
+    def __init__(self) -> None:
+        self.fails = False
+        """Set by `--measure-all`."""
+        self._found: list[str] = []
+
+    def add(self, what: str) -> None:
+        """Report a bound that no attempt could measure; it fails the test where everything has to be measured."""
+        assert not self.fails, f"{what}: not measured, the host stalled in each of {1 + REPEATS} attempts"
+        self._found.append(what)
+
+    def take(self) -> list[str]:
+        """Return what was added, and forget it."""
+        found, self._found = self._found, []
+        return found
+
+
+UNMEASURED = Unmeasured()
 
 
 class HostWatch:
@@ -65,7 +90,10 @@ class HostWatch:
 
 
 def repeated_when_the_host_stalls(test: Callable[..., None]) -> Callable[..., None]:
-    """Repeat a test that ended in `HostStalled`; it gets a folder of its own each time as `tmp_path`."""
+    """Repeat a test that ended in `HostStalled`; it gets a folder of its own each time as `tmp_path`.
+
+    A test that is spoilt each time is skipped as unmeasured.
+    """
 
     @functools.wraps(test)
     def repeat(*args: Any, tmp_path: Any, **kwargs: Any) -> None:
@@ -77,6 +105,7 @@ def repeated_when_the_host_stalls(test: Callable[..., None]) -> Callable[..., No
                 return
             except HostStalled as stalled:
                 print(f"{test.__name__}, attempt {attempt + 1}: {stalled}")
-        raise AssertionError(f"the host stalled in each of {1 + REPEATS} attempts")
+        UNMEASURED.add(test.__name__)
+        pytest.skip(f"unmeasured: the host stalled in each of {1 + REPEATS} attempts")
 
     return repeat

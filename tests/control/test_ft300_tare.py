@@ -52,6 +52,20 @@ def test_mean_deviation_and_count():
     assert result.count == 8
 
 
+def test_the_quarters_of_a_tare_are_its_first_and_its_last_samples():
+    """10 samples of 1, 2, 4, 8 ...: quarters of 2 each, so that 1 and 2 are the first and 256 and 512 the last."""
+    sums = TareSums()
+    for k in range(10):
+        sums = add(sums, (0.0, 2.0**k, 0.0, 0.0, 0.0, 0.0), 10)
+    assert sums.count == 10
+    assert sums.origin[1] == 1.0
+    assert sums.total[1] == 1023.0 - 10.0
+    assert sums.first[1] == (1.0 + 2.0) - 2.0
+    assert sums.last[1] == (256.0 + 512.0) - 2.0
+    assert sums.first_squares[1] == 0.0**2 + 1.0**2
+    assert sums.last_squares[1] == 255.0**2 + 511.0**2
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_a_sensor_at_rest_is_accepted(seed):
     result = tare(at_rest(seed=seed), *NOISE)

@@ -3,15 +3,13 @@
 import math
 
 import pytest
-from hypothesis import strategies as st
 
 from control.base_velocity import body_from_world, contact_point_world, heading_rate
 from control.push_law import force_angle, push_angle, return_angle
+from control.wrench import low_pass
 from robot_io.messages import BodyTwist, WorldTwist
 
 QUARTER = math.pi / 2
-angles = st.floats(-math.pi, math.pi)
-lengths = st.floats(-10.0, 10.0)
 
 
 def about(vx, vy, omega):
@@ -90,3 +88,17 @@ def test_the_contact_point_turns_with_the_base():
 )
 def test_the_heading_is_held(wanted, yaw, rate):
     assert heading_rate(wanted, yaw, 1.0, 0.1) == pytest.approx(rate, abs=1e-12)
+
+
+def test_the_low_pass_moves_each_axis_by_the_same_share_of_its_own_step():
+    """After one time constant 1 - 1/e of the way is gone: 0.632 of 10, -20 and 40 N, from 1, 2 and 3 N."""
+    share = 1.0 - math.exp(-1.0)
+    assert low_pass((1.0, 2.0, 3.0), (11.0, -18.0, 43.0), 0.05, 0.05) == pytest.approx(
+        (1.0 + 10.0 * share, 2.0 - 20.0 * share, 3.0 + 40.0 * share), rel=1e-12
+    )
+
+
+def test_the_low_pass_of_no_time_is_what_it_was_and_without_a_time_constant_the_sample():
+    before, sample = (1.0, 2.0, 3.0), (11.0, -18.0, 43.0)
+    assert low_pass(before, sample, 0.0, 0.05) == before
+    assert low_pass(before, sample, 0.01, 0.0) == sample

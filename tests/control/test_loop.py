@@ -1,4 +1,4 @@
-"""The loop's own handlers, one at a time: what the operator's pipe means, and a flood of packets."""
+"""The loop's own handlers, one at a time: what the operator's pipe means, a flood of packets, and its deadlines."""
 
 import os
 from types import SimpleNamespace
@@ -88,3 +88,41 @@ def test_of_a_flood_the_newest_packets_stay(bench):
     seqs = [reading.seq for reading in bench.loop._input(0, 0, 0).ft.readings]
     assert seqs == list(range(150 - 64, 150))
     assert bench.loop._input(0, 0, 0).ft.readings == ()
+
+
+def late_by(bench, *lates_ms):
+    """Let the loop's deadlines, of 10 ms each, be served so late; return number and skipped periods of each tick."""
+    loop, now_ns = bench.loop, [5_000_000_000]
+    loop._clock = lambda: now_ns[0]
+    ticks = []
+    loop._one_tick = lambda inp: ticks.append((inp.tick, inp.host.skipped, inp.host.late_ns))
+    deadline_ns = now_ns[0]
+    for late_ms in lates_ms:
+        now_ns[0] = deadline_ns + round(late_ms * 1e6)
+        loop._on_deadline(deadline_ns)
+        deadline_ns = loop._timer.deadline_ns
+        loop._timer.cancel()
+    return ticks
+
+
+def test_ticks_count_from_zero_and_every_skipped_period_is_one(bench):
+    """A tick's number tells its time: 25 ms late is two periods skipped and 5 ms late, and the grid stays."""
+    assert late_by(bench, 0, 0, 25, 0, 10, 0) == [
+        (0, 0, 0),
+        (1, 0, 0),
+        (4, 2, 5_000_000),
+        (5, 0, 0),
+        (7, 1, 0),
+        (8, 0, 0),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("alive", "gone", "seen"),
+    [(True, (), True), (False, (), False), (True, ("gate",), False), (True, ("arm", "recorder"), True)],
+)
+def test_the_gate_is_alive_while_its_link_and_its_process_are(bench, alive, gone, seen):
+    """A socket that is closed is enough: the process may live on."""
+    bench.loop._base.alive = alive
+    bench.loop._watch.gone.update(gone)
+    assert bench.loop._input(0, 0, 0).host.gate_alive is seen

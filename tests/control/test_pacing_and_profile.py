@@ -81,6 +81,20 @@ def test_ramp_up_plateau_and_ramp_down(elapsed_s, start, remaining_m, speed):
 
 def test_a_push_slower_than_creeping_is_not_hurried():
     assert push_speed(9.0, 0.0, 0.004, 1.0, 1e-6) == pytest.approx(0.004)
+    assert push_speed(0.0, 0.05, 0.004, 1.0, 1e-6) == pytest.approx(0.004)  # nor where it comes in faster
+
+
+@pytest.mark.parametrize(
+    ("speed", "ramp_s", "remaining_m", "braked"),
+    [(0.2, 1.0, 0.025, 0.1), (0.2, 2.0, 0.05, 0.1), (0.1, 0.5, 0.00625, 0.05), (0.3, 3.0, 0.2, 0.2)],
+)
+def test_braking_is_the_ramp_up_the_other_way_round(speed, ramp_s, remaining_m, braked):
+    """v^2 = 2 a s with a = speed / ramp: 0.1 m/s needs 2.5 cm at 0.2 m/s^2, and 5 cm at 0.1 m/s^2."""
+    assert push_speed(9.0, 0.0, speed, ramp_s, remaining_m) == pytest.approx(braked, rel=1e-12)
+
+
+def test_the_last_millimetres_are_gone_at_a_centimetre_a_second():
+    assert push_speed(9.0, 0.0, 0.1, 1.0, 1e-6) == 0.01
 
 
 @given(st.floats(0.0, 20.0), st.floats(0.0, 0.5), st.floats(0.001, 0.5), st.floats(0.1, 10.0), st.floats(-1.0, 10.0))

@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
+from control.sensing import sense
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ControlState, Mode, Operator, Phase, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing
@@ -105,6 +106,15 @@ def test_the_approach_ramps_up_along_the_path_until_five_samples_of_force():
     # 5 samples at 0.05 m/s and 100 Hz: the push begins 4 ticks of 0.5 mm behind the first touch.
     assert bench.state.control.contact_from_m == pytest.approx(GAP_M + 4 * 0.0005, abs=0.0006)
     assert bench.state.control.progress_m == 0.0
+
+
+def test_no_progress_is_counted_before_the_first_contact():
+    """In its first second the approach goes 2.5 cm along the path; none of that is a push."""
+    bench = FoldBench().run_to(Phase.APPROACH)
+    for _ in range(100):
+        bench.fold(no_force)
+        assert bench.state.control.progress_m == 0.0
+    assert bench.output.contact_x == pytest.approx(0.025, abs=0.001)
 
 
 def test_four_samples_are_no_contact():
@@ -290,6 +300,46 @@ def test_without_force_the_law_is_not_evaluated_and_the_pusher_turns_back():
     assert bench.state.control.theta_p == pytest.approx(-0.2 * bench.state.control.lateral_m, abs=1e-9)
 
 
+@pytest.mark.parametrize("lateral", [0.02, -0.02])
+def test_the_open_loop_baseline_searches_straight_ahead(lateral):
+    """It knows no k_y: 2 cm beside the path it goes on along the path, touching or not."""
+    bench = pushing(("control.force_filter_tau_s=0", "control.controller=open-loop"))
+    carried_to(bench, y=lateral)
+    for n in range(45):
+        bench.fold(no_force, n)
+        assert bench.state.control.phase == Phase.LOST
+        assert bench.state.control.lateral_m == pytest.approx(lateral, abs=1e-6)
+        assert bench.state.control.theta_p == 0.0
+        assert velocity(bench)[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_push_that_lost_its_object_is_not_done_by_distance():
+    """Two metres are pushed, not driven: beyond them without force it goes on searching."""
+    bench = pushing(("control.force_filter_tau_s=0",))
+    bench.run_until(lambda b: b.state.control.progress_m > 1.995)
+    for n in range(200):
+        bench.fold(no_force, n)
+        if bench.state.control.progress_m > 2.0:
+            break
+    bench.fold(no_force)
+    assert bench.state.control.progress_m > 2.0
+    assert bench.state.control.phase == Phase.LOST
+    bench.fold()
+    assert bench.state.control.phase == Phase.REST
+
+
+def test_a_push_ends_right_on_its_distance():
+    """Reached is reached: at 2 m and not a step beyond, here to the last bit (the contact began at 0)."""
+    bench = pushing(("control.force_filter_tau_s=0",))
+    contact_x = 2.0 + bench.state.control.contact_from_m
+    carried_to(bench, x=contact_x - bench.rig.frames.contact_in_base_m[0])
+    control = replace(bench.state.control, contact_from_m=bench.pose.x + bench.rig.frames.contact_in_base_m[0] - 2.0)
+    bench.state = replace(bench.state, control=control)
+    bench.fold()
+    assert bench.state.control.progress_m == 2.0
+    assert bench.state.control.phase == Phase.REST
+
+
 def test_the_search_ends_after_three_seconds():
     bench = lost(overrides=("control.force_filter_tau_s=0", "control.lost_distance_m=2"))
     ticks = bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
@@ -405,6 +455,42 @@ def test_the_filter_takes_each_packet_with_its_own_time(split):
     assert bench.state.control.force_world[0] == pytest.approx(25.0 + (start - 25.0) * math.exp(-1.0), abs=0.05)
 
 
+def filtered(force_world, gap_ms, tau_s=0.1):
+    """Return the force after one packet of 10 N along x that came `gap_ms` after the last one."""
+    bench = pushing((f"control.force_filter_tau_s={tau_s}",))
+    settings = bench.core.control
+    now_ns = 10_000_000_000
+    reading = replace(bench.good_input().ft.readings[0], received_ns=now_ns, force=(BIAS[0], BIAS[1], BIAS[2] - 10.0))
+    last_ns = now_ns - gap_ms * 1_000_000
+    before = replace(bench.state.control, last_reading_ns=last_ns, force_world=force_world, bias_force=BIAS[:3])
+    return sense(settings, before, (reading,), 0.0, now_ns)
+
+
+@pytest.mark.parametrize(("gap_ms", "counted_s"), [(10, 0.01), (99, 0.099), (100, 0.1), (101, 0.1), (5000, 0.1)])
+def test_a_gap_between_packets_counts_as_a_tenth_of_a_second_at_most(gap_ms, counted_s):
+    """However long nothing came, what was felt before is not forgotten at once: of a step to 10 N, 1 - 1/e."""
+    assert filtered((0.0, 0.0, 0.0), gap_ms).force_world[0] == pytest.approx(10.0 * (1.0 - math.exp(-counted_s / 0.1)))
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_filtered_force_that_is_no_number_on_one_axis_is_no_force(axis, bad):
+    assert filtered((1.0, 2.0, 3.0), 10).force_valid
+    assert not filtered(tuple(bad if i == axis else 1.0 for i in range(3)), 10).force_valid
+
+
+@pytest.mark.parametrize(("age_ns", "valid"), [(99_999_999, True), (100_000_000, True), (100_000_001, False)])
+@pytest.mark.parametrize("came", ["in this tick", "before"])
+def test_a_force_is_valid_for_100_ms(age_ns, valid, came):
+    bench = pushing()
+    now_ns = 10_000_000_000
+    reading = replace(bench.good_input().ft.readings[0], received_ns=now_ns - age_ns)
+    state = replace(bench.state.control, last_reading_ns=now_ns - age_ns)
+    readings = (reading,) if came == "in this tick" else ()
+    assert state.force_valid
+    assert sense(bench.core.control, state, readings, 0.0, now_ns).force_valid is valid
+
+
 # --- the end -------------------------------------------------------------------------------------------------
 
 
@@ -436,6 +522,45 @@ def test_the_push_ends_on_its_distance_where_the_acceleration_limit_is_below_the
     bench.run_until(lambda b: b.output.finished)
     assert bench.output.exit_code == 0
     assert 1.0 <= bench.state.control.end_progress_m < 1.01
+
+
+def test_the_retreat_ramps_up_backwards():
+    """0.05 m/s within a second, as the approach, and the other way."""
+    bench = pushing()
+    bench.run_to(Phase.RETREAT)
+    speeds = []
+    for _ in range(105):
+        bench.fold()
+        assert bench.state.control.phase == Phase.RETREAT
+        speeds.append(velocity(bench)[0])
+    assert speeds[:3] == pytest.approx([-0.0005, -0.001, -0.0015], abs=1e-9)
+    assert speeds[49] == pytest.approx(-0.025, abs=1e-9)
+    assert speeds[99:] == pytest.approx([-0.05] * 6, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("twist", "rests"),
+    [
+        (BodyTwist(0.0099, 0.0, 0.0), True),
+        (BodyTwist(0.0, -0.0099, 0.0), True),
+        (BodyTwist(0.01, 0.0, 0.0), False),
+        (BodyTwist(0.0101, 0.0, 0.0), False),
+        (BodyTwist(0.0, 0.0101, 0.0), False),
+        (BodyTwist(0.008, 0.008, 0.0), False),  # 0.0113 m/s in all
+    ],
+)
+def test_rest_is_less_than_a_centimetre_a_second_for_300_ms(twist, rests):
+    bench = pushing().run_to(Phase.REST)
+    since_ns = bench.now_ns - 10_000_000
+    for n in range(40):
+        bench.fold(lambda inp, _: replace(inp, base=replace(inp.base, odometry=twist)), n)
+        if bench.state.control.phase != Phase.REST:
+            break
+    if rests:
+        assert 300 <= (bench.now_ns - 10_000_000 - since_ns) / 1e6 <= 310
+        assert bench.state.control.phase == Phase.RETREAT
+    else:
+        assert bench.state.control.phase == Phase.REST
 
 
 @pytest.mark.parametrize("phase", [Phase.REST, Phase.CHECK])
@@ -519,6 +644,23 @@ def test_no_deadline_of_the_search_runs_while_the_base_is_held():
     ticks = bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
     assert 99 <= held <= 101  # the clean second
     assert 95 <= ticks <= 101
+
+
+def test_nor_while_the_loop_skips_ticks_as_it_is_held():
+    """6 s held, in which two of three ticks are skipped, cost the 3 s of the search nothing."""
+    bench = lost(overrides=("control.force_filter_tau_s=0", "control.lost_distance_m=2"))
+    since_ns = bench.state.control.phase_since_ns
+    began_ns = bench.now_ns - 10_000_000
+    bench.fold(lambda inp, _: old_arm(no_force(inp)))  # not yet held: the supervisor finds it in this tick
+    begun_ns = bench.now_ns
+    for n in range(200):
+        bench.skip(2)
+        bench.fold(lambda inp, n: replace(old_arm(no_force(inp)), host=replace(inp.host, skipped=2)), n)
+        assert bench.state.control.phase == Phase.LOST
+    assert since_ns == began_ns
+    held_ns = bench.now_ns - begun_ns
+    assert held_ns == 6_000_000_000
+    assert bench.state.control.phase_since_ns == since_ns + held_ns
 
 
 def test_an_approach_that_was_held_ramps_up_again():

@@ -17,7 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.host_watch import REPEATS, HostStalled, HostWatch
+import pytest
+
+from tests.host_watch import REPEATS, UNMEASURED, HostStalled, HostWatch
 from tests.push_runs import QUICK, Ended, Run, stands, started, world_of
 
 PUSHING = r"PUSH +(?!0\.00/)[0-9.]+/.* v 0\.10 m/s"
@@ -94,9 +96,13 @@ def within(
 ) -> Round:
     """Strike until a round keeps its bounds; only one that the host stalled is repeated, three times at most.
 
+    Where the host stalled each of them, the bounds are reported as unmeasured, and the last round is judged by its
+    order: a zero where one can come, and wheels at rest after it.
+
     zero_ms: the zero command's bound (None: none can come). rest_ms: the wheels' bound after it, or after the
     signal where no command comes.
     """
+    last: Round | None = None
     for attempt in range(1 + REPEATS):
         try:
             found = strike(state, tmp_path / f"run{attempt}", name, number, host)
@@ -110,7 +116,13 @@ def within(
             return found
         assert found.stall_ms > STALL_MS, f"{told}; bounds: {_ms(zero_ms)}, then {_ms(rest_ms)}"
         print("  repeated: the host stalled")
-    raise AssertionError(f"the host stalled in each of {1 + REPEATS} rounds")
+        last = found
+    UNMEASURED.add(f"{number.name} of {name}: zero within {_ms(zero_ms)}, rest within {_ms(rest_ms)}")
+    if last is None:
+        pytest.skip(f"unmeasured: the host stalled each of {1 + REPEATS} pushes before the blow")
+    assert last.rest_ms is not None, "the wheels never stood"
+    assert zero_ms is None or (last.zero_ms is not None and last.zero_ms <= last.rest_ms), "no zero before the rest"
+    return last
 
 
 def _kept(found: Round, zero_ms: float | None, rest_ms: float) -> bool:

@@ -14,6 +14,7 @@ from robot_io.geometry import (
     rotated,
     seen_from_frame,
     wrap_angle,
+    yaw_from_quaternion,
 )
 from robot_io.messages import Pose2D
 
@@ -45,6 +46,16 @@ def test_a_wrapped_angle_is_the_same_direction_in_range(angle):
     assert -math.pi < wrapped <= math.pi
     assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)
     assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-9)
+
+
+@pytest.mark.parametrize("about", ["forward", "left"])
+@pytest.mark.parametrize(
+    ("tilt_deg", "upright"), [(0.0, True), (25.8, True), (25.9, False), (90.0, False), (180.0, False)]
+)
+def test_a_body_tilted_by_26_degrees_has_no_heading(about, tilt_deg, upright):
+    half = math.radians(tilt_deg) / 2
+    x, y = (math.sin(half), 0.0) if about == "forward" else (0.0, math.sin(half))
+    assert (yaw_from_quaternion(x, y, 0.0, math.cos(half)) == 0.0) is upright
 
 
 def test_an_angle_that_is_not_a_number_stays_none():

@@ -360,3 +360,47 @@ def test_a_base_that_stands_anywhere_has_not_jumped_nor_turned(at):
     seen = SafetyState(pose_seq=5, pose_ns=NOW, pose_x=at.x, pose_y=at.y, pose_yaw=at.yaw)
     after, found = base(seen, control=replace(TARED, held_yaw=at.yaw), pose=at, pose_seq=6)
     assert (after.pose_jumps, found) == (0, [])
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_force_and_torque_are_judged_without_the_bias_of_their_own_axis(axis):
+    """150 N and 20 N*m beyond the bias of the axis they are on; the other axes have biases of their own."""
+    bias, bias_torque = (1.0, -2.0, 4.0), (0.1, -0.2, 0.4)
+    tared = replace(TARED, bias_force=bias, bias_torque=bias_torque)
+
+    def plus(value, rest):
+        return tuple(b + value if i == axis else b for i, b in enumerate(rest))
+
+    assert sensor(bias, bias_torque, tared) == []
+    for sign in (1.0, -1.0):
+        assert sensor(plus(sign * 99.999, bias), bias_torque, tared) == []
+        assert sensor(plus(sign * 149.999, bias), bias_torque, tared) == ["F50-slow"]
+        assert sensor(plus(sign * 150.001, bias), bias_torque, tared) == ["F50-stop"]
+        assert sensor(bias, plus(sign * 19.999, bias_torque), tared) == []
+        assert sensor(bias, plus(sign * 20.001, bias_torque), tared) == ["F51"]
+
+
+# --- the pose that control may use -------------------------------------------------------------------------------
+
+KNOWN = SafetyState(pose_seq=5, pose_ns=NOW - 10_000_000, pose_x=1.0, pose_y=2.0, pose_yaw=0.1)
+NEAR, FAR = Pose2D(1.001, 2.0, 0.1), Pose2D(3.0, 2.0, 0.1)
+
+
+def used(state, pose, **changes):
+    inp = with_base(pose=pose, pose_seq=6, pose_received_ns=NOW, **changes)
+    return base_checks.trusted_pose(SETTINGS, state, inp)
+
+
+def test_a_good_pose_is_used_and_else_the_last_good_one():
+    last = Pose2D(1.0, 2.0, 0.1)
+    assert used(KNOWN, NEAR) == NEAR
+    assert used(KNOWN, FAR) == last
+    assert used(KNOWN, NEAR, pose_valid=False) == last
+    assert used(KNOWN, Pose2D(1.0, math.nan, 0.1)) == last
+
+
+def test_before_the_first_good_pose_it_is_the_newest_whatever_it_is():
+    assert used(SafetyState(), FAR) == FAR
+    assert used(SafetyState(), FAR, pose_valid=False) == FAR
+    first_of_all = used(replace(KNOWN, pose_seq=1), FAR)  # one good pose is one to fall back on
+    assert first_of_all == Pose2D(1.0, 2.0, 0.1)

@@ -253,6 +253,18 @@ def test_a_pause_of_the_host_is_not_taken_for_dead_devices():
     assert bench.output.faults == ()
 
 
+def test_one_skipped_tick_is_a_pause():
+    """After 20 ms without a tick an arm that was silent for 80 ms is judged by its next chance to speak."""
+    bench = pushing()
+    bench.skip(1)
+    bench.fold(
+        lambda inp, n: replace(old("arm", "published_ns", "changed_ns")(inp, 7), host=replace(inp.host, skipped=1))
+    )
+    assert bench.output.faults == ("F60-late",)
+    bench.fold(lambda inp, n: old("arm", "published_ns", "changed_ns")(inp, 8))
+    assert bench.output.faults == ("F24-hold",)
+
+
 def test_devices_still_silent_a_tick_later_are_held_and_after_that_stopped():
     bench = paused(30)
     bench.fold(lambda inp, _: EVERYONE_SILENT(inp, 31))
@@ -308,6 +320,19 @@ def test_a_loop_that_skips_every_other_period_still_sees_a_dead_sensor():
             break
     assert "F01-stop" in bench.output.faults
     assert n <= 8  # 160 ms at 20 ms a tick
+
+
+def test_a_second_skipping_tick_in_a_row_is_no_pause_any_more():
+    """One pause is forgiven for one tick; where the next tick skips as well, silent devices are held."""
+    bench = paused(30)
+    bench.skip(1)
+    bench.fold(lambda inp, _: replace(EVERYONE_SILENT(inp, 32), host=replace(inp.host, skipped=1)))
+    assert {"F01-hold", "F24-hold", "F31-hold"} <= set(bench.output.faults)
+    assert bench.output.mode == Mode.HOLD
+    bench.skip(1)
+    bench.fold(lambda inp, _: replace(EVERYONE_SILENT(inp, 34), host=replace(inp.host, skipped=1)))
+    assert {"F01-stop", "F24-stop", "F31-stop"} <= set(bench.output.faults)
+    assert bench.output.mode == Mode.STOP
 
 
 # --- a start in the middle of the sensor's rhythm ----------------------------------------------------------------

@@ -252,6 +252,39 @@ def test_rubbish_is_refused_or_reads_as_exactly_itself():
         EVERYTHING.decode(payload + b"\x00")
 
 
+class Flags(msgspec.Struct, frozen=True):
+    """Bools in a row: not a byte of padding between them, wherever they begin."""
+
+    text: str
+    one: bool
+    two: bool
+    last: Annotated[int, "uint8"]
+
+
+class Padded(msgspec.Struct, frozen=True):
+    """Padding and no bool: 0 to 7 bytes before the double, by the length of the text."""
+
+    text: str
+    byte: Annotated[int, "uint8"]
+    number: float
+
+
+@pytest.mark.parametrize("length", range(8))
+def test_a_bool_of_two_and_padding_that_is_not_zero_are_refused_wherever_they_stand(length):
+    """CDR knows bools of 0 and 1 and says nothing of padding; a log reads as exactly what would be written again."""
+    flags, padded = CdrType(Flags, "push_msgs/msg/Flags"), CdrType(Padded, "push_msgs/msg/Padded")
+    payload = flags.encode(Flags("x" * length, True, False, 7))
+    for at in (-3, -2):
+        with pytest.raises(LogDamaged):
+            flags.decode(payload[:at] + b"\x02" + payload[at + 1 :])
+    payload = padded.encode(Padded("x" * length, 7, 1.5))
+    padding = len(payload) - 4 - (4 + length + 1) - 1 - 8
+    assert 0 <= padding < 8
+    for at in range(-8 - padding, -8):
+        with pytest.raises(LogDamaged):
+            padded.decode(payload[:at] + b"\x01" + payload[at + 1 :])
+
+
 def test_a_huge_count_is_refused_before_anything_is_made():
     payload = bytearray(SMALL.encode(Small(False, 0, 0.0, "", 0.0, (1.0,))))
     payload[-12:-8] = b"\xff\xff\xff\xff"

@@ -5,11 +5,13 @@ from __future__ import annotations
 import errno
 import itertools
 import termios
+from types import SimpleNamespace
 
 import pytest
 import serial
 
 from robot_io.ft300.driver import Ft300
+from robot_io.ft300.serial_link import SerialLine
 from robot_io.messages import LinkState
 
 PACKET = bytes.fromhex("20 4E D2 04 D2 E9 10 27 64 00 32 FB 8A 0C 0C 17")
@@ -170,3 +172,51 @@ def test_packets_before_the_failure_are_delivered():
     samples = bench.sensor.drain()
     assert [after.seq - before.seq for before, after in itertools.pairwise(samples)] == [1, 1]
     assert bench.sensor.health().state is LinkState.LOST
+
+
+# --- silence of the line -----------------------------------------------------------------------------------------
+
+
+class TimedLine(SerialLine):
+    """A line on which bytes come at given times (ms), and a clock that only waiting moves."""
+
+    def __init__(self, monkeypatch, *arrivals_ms):
+        self.now_ms = 0.0
+        self.arrivals = list(arrivals_ms)
+        self.bursts = []
+        self.serial = SimpleNamespace(write=lambda data: self.bursts.append((self.now_ms, data)))
+        clock = SimpleNamespace(monotonic=lambda: self.now_ms / 1000, sleep=lambda s: self.pass_ms(s * 1000))
+        monkeypatch.setattr("robot_io.ft300.serial_link.time", clock)
+
+    def pass_ms(self, time_ms):
+        self.now_ms += time_ms
+
+    def wait_readable(self, timeout_ms):
+        until_ms = self.now_ms + timeout_ms
+        self.now_ms = min([until_ms, *(max(at, self.now_ms) for at in self.arrivals)])
+
+    def read_now(self, limit=4096):
+        come = [at for at in self.arrivals if at <= self.now_ms]
+        del self.arrivals[: len(come)]
+        return b"." * len(come)
+
+
+@pytest.mark.parametrize(("heard_at_ms", "silent"), [(1, False), (60, False), (94, False), (106, True)])
+def test_silence_is_100_ms_without_a_byte(monkeypatch, heard_at_ms, silent):
+    line = TimedLine(monkeypatch, heard_at_ms)
+    assert line.is_silent() is silent
+    assert line.now_ms == (pytest.approx(100.0, abs=5.0) if silent else heard_at_ms)
+
+
+def test_a_sensor_is_quiet_100_ms_after_its_last_byte(monkeypatch):
+    """A gap of 90 ms is none: packets may wait that long in an adapter."""
+    line = TimedLine(monkeypatch, 10, 20, 110, 200)
+    assert line.make_quiet(1.0)
+    assert line.now_ms == pytest.approx(300.0, abs=6.0)
+    assert {data for _, data in line.bursts} == {b"\xff" * 20}
+
+
+def test_a_sensor_that_talks_every_90_ms_is_not_quiet_in_time(monkeypatch):
+    line = TimedLine(monkeypatch, *range(0, 2000, 90))
+    assert not line.make_quiet(1.0)
+    assert line.now_ms == pytest.approx(1000.0, abs=6.0)

@@ -220,6 +220,24 @@ def test_logs_of_other_encodings_are_refused_in_one_sentence(tmp_path, kind):
         list(read_log(foreign(tmp_path / "x.mcap", **kind)))
 
 
+@pytest.mark.parametrize(("channels", "refused"), [(1000, False), (1002, True)])
+def test_a_log_of_more_than_a_thousand_topics_is_refused(tmp_path, channels, refused):
+    """Each costs memory while nothing has been read yet; ours have about thirty."""
+    with (tmp_path / "x.mcap").open("wb") as file:
+        writer = Writer(file, enable_data_crcs=True)
+        writer.start("ros2", "other")
+        schema_id = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data\n")
+        for n in range(channels):
+            channel_id = writer.register_channel(f"/topic{n}", "cdr", schema_id)
+        writer.add_message(channel_id, 1, b"\0\1\0\0\2\0\0\0x\0", 1)
+        writer.finish()
+    if refused:
+        with pytest.raises(LogDamaged, match="too many channels"):
+            list(read_log(tmp_path / "x.mcap"))
+    else:
+        assert [message.topic for message in read_log(tmp_path / "x.mcap")] == ["/topic999"]
+
+
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n" * 2, bytes(100)])
 def test_files_that_are_no_logs_are_refused(tmp_path, content):
     path = tmp_path / "x.mcap"

@@ -113,6 +113,20 @@ def test_the_driver_says_so_and_raises_nothing(ends, last_words):
     base.close()
 
 
+@pytest.mark.parametrize(("quiet_ns", "moves"), [(99_999_999, True), (100_000_000, True), (100_000_001, False)])
+def test_nothing_that_moves_leaves_on_a_link_that_was_quiet_for_100_ms(ends, quiet_ns, moves):
+    link, _ = ends
+    now_ns = time.monotonic_ns()
+    base = Ridgeback(URL, clock=lambda: now_ns)
+    base._link, base._started, base._state = link, True, LinkState.UP
+    base.newest_inbound_ns = now_ns - quiet_ns
+    twist = BodyTwist(0.1, 0.0, 0.0)
+    assert base.command(twist) == (twist if moves else BodyTwist())
+    assert base.health().counters["held_back"] == (0 if moves else 1)
+    assert base.command(BodyTwist()) == BodyTwist()
+    assert base.health().counters["sent"] == 2
+
+
 def test_a_wait_ends_in_time_however_much_still_comes(ends):
     link, bridge = ends
     bridge.sendall(frame(TEXT, b"more"))

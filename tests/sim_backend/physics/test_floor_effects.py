@@ -62,6 +62,22 @@ def test_a_push_so_high_that_the_slider_tips_is_refused():
         Floor(BARREL, "uniform", FloorEffects(shift_m=float("nan")))
 
 
+def test_a_disc_whose_centre_of_friction_is_off_tips_that_much_earlier():
+    """A disc of 0.25 m with its load 0.06 m ahead and 0.08 m to the left has 0.15 m left, in that direction."""
+    off = SliderModel(Circle(0.25), 1.0, 0.1, 0.3, cof_m=(0.06, 0.08))
+    Floor(off, "uniform", FloorEffects(shift_m=0.1499))
+    with pytest.raises(ConfigError, match="tips"):
+        Floor(off, "uniform", FloorEffects(shift_m=0.1501))
+
+
+def test_a_box_whose_centre_of_friction_is_off_tips_that_much_earlier():
+    """0.4 m long and 0.6 m wide, its load 0.05 m ahead and 0.15 m to the left: 0.15 m to the nearest side."""
+    Floor(off := SliderModel(Rectangle(0.4, 0.6), 1.0, 0.1, 0.3, cof_m=(0.05, 0.15)), "uniform", FloorEffects())
+    Floor(off, "uniform", FloorEffects(shift_m=0.1499))
+    with pytest.raises(ConfigError, match="tips"):
+        Floor(off, "uniform", FloorEffects(shift_m=0.1501))
+
+
 @pytest.mark.parametrize(
     ("model", "pressure", "push", "d"),
     [
