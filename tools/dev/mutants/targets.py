@@ -37,7 +37,7 @@ WHOLE = (
 WHOLE_TESTS = ("tests/control", "tests/safety", "tests/robot_io", "tests/tools/log", "tests/wire")
 """Measured once, so that a mutant only meets the tests that reach it."""
 
-_RUNS = ("tests/tools/run/test_run_emulated.py",)
+_RUNS = ("tests/tools/commands/test_run_emulated.py",)
 SHELLS = (
     Shell("safety/gate_process.py", ("tests/safety/test_gate_process.py", *_RUNS, "tests/faults/test_kills.py")),
     Shell("control/loop.py", ("tests/control/test_loop.py", "tests/tools/run/test_lockstep.py", *_RUNS)),
