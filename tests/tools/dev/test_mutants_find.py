@@ -87,7 +87,7 @@ def test_a_mutant_says_where_it_is_even_after_letters_of_two_bytes():
 
 
 def test_every_mutant_can_be_compiled_and_differs_from_the_others():
-    source = b"def f(a):\n    for i in a:\n        if i == 1:\n            break\n        yield g(i, x=1,\n            y=2)\n"
+    source = b"def f(a):\n    for i in a:\n        if i == 1:\n            break\n        yield g(i, x=1,\n y=2)\n"
     made = [mutant.apply(source) for mutant in find_mutants("x.py", source)]
     assert len(made) > 8
     assert len({ast.dump(ast.parse(text)) for text in [source, *made]}) == len(made) + 1

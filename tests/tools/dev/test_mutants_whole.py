@@ -48,7 +48,8 @@ def test_count():
 SHELL = '"""A shell."""\nif __name__ == "__main__":\n    raise SystemExit(WORTH)\nWORTH = 7\n'
 SHELL_TEST = """import subprocess, sys
 def test_exit():
-    assert subprocess.run([sys.executable, "-c", "import tools.shell; raise SystemExit(tools.shell.WORTH)"]).returncode == 7
+    code = "import tools.shell; raise SystemExit(tools.shell.WORTH)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 7
 """
 MORE = "def test_more():\n    assert clamp(2) == 2\n    assert count(0) and count(6) and count(1)\n"
 
@@ -85,7 +86,7 @@ def command(project, *words):
 
 
 def run(project, *words):
-    return subprocess.run(**command(project, *words), capture_output=True, timeout=80, check=False)
+    return subprocess.run(**command(project, *words), capture_output=True, timeout=200, check=False)
 
 
 def tried(project):
@@ -93,6 +94,8 @@ def tried(project):
     return [json.loads(line) for line in lines]
 
 
+@pytest.mark.long
+@pytest.mark.timeout(300)
 def test_it_names_survivors_and_after_a_new_test_tries_only_these_again(project):
     before = {path: path.read_bytes() for path in project.rglob("*.py")}
     done = run(project)
@@ -123,6 +126,8 @@ def test_it_names_survivors_and_after_a_new_test_tries_only_these_again(project)
 
 
 def test_interrupted_it_goes_on_where_it_was(project):
+    (project / "control/law.py").write_text(LAW.partition("def count")[0])
+    (project / "tests/control/test_law.py").write_text(TEST.replace(", count", "").partition("def test_count")[0])
     process = subprocess.Popen(**command(project), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     results = project / ".mutants/results.jsonl"
     deadline = time.monotonic() + 60.0
@@ -135,7 +140,7 @@ def test_interrupted_it_goes_on_where_it_was(project):
     assert process.returncode == 130, said
     assert "goes on from there" in said
     begun = [one["id"] for one in tried(project)]
-    assert run(project).returncode == 1
+    assert run(project).returncode == 0  # the tests of this law leave nothing out
     names = [one["id"] for one in tried(project)]
     assert len(names) > len(begun)
     assert len(set(names)) == len(names)
