@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
-from control.path import wrap
+from robot_io.geometry import point_outside, seen_from_frame, wrap_angle
 from robot_io.messages import BodyTwist, WorldTwist
 
 
 def body_from_world(twist: WorldTwist, yaw: float) -> BodyTwist:
     """Rotate a WORLD velocity into the BODY frame by the *measured* heading `yaw` (rad)."""
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return BodyTwist(cos * twist.vx + sin * twist.vy, cos * twist.vy - sin * twist.vx, twist.omega)
+    return BodyTwist(*seen_from_frame(twist.vx, twist.vy, yaw), twist.omega)
 
 
 def heading_rate(yaw_wanted: float, yaw: float, gain_per_s: float, limit_rad_per_s: float) -> float:
     """Return the turn rate in rad/s that brings the base back to `yaw_wanted`."""
-    return min(max(gain_per_s * wrap(yaw_wanted - yaw), -limit_rad_per_s), limit_rad_per_s)
+    return min(max(gain_per_s * wrap_angle(yaw_wanted - yaw), -limit_rad_per_s), limit_rad_per_s)
 
 
 def contact_point_world(x: float, y: float, yaw: float, contact_x: float, contact_y: float) -> tuple[float, float]:
@@ -25,5 +22,4 @@ def contact_point_world(x: float, y: float, yaw: float, contact_x: float, contac
     x, y, yaw: measured pose of the base. contact_x, contact_y: ball centre in the BODY frame. The point where
     ball and object touch differs from the centre by R sin(angle) sideways, R being the ball's radius.
     """
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return x + cos * contact_x - sin * contact_y, y + sin * contact_x + cos * contact_y
+    return point_outside(x, y, yaw, contact_x, contact_y)

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Protocol
 
+from msgspec.structs import replace
+
 from control.pacer import wake
 from control.run_notes import RunNotes
 from control.timing import LoopTiming
@@ -36,8 +38,8 @@ from robot_io.tick import (
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
 LOG_LOST = b"L"[0]
 """The launcher says that the recorder cannot write any more: as good as gone."""
-MAX_READINGS = 64
-"""More packets than this in one tick (0.64 s of them) are a flood; the oldest go."""
+FLOOD_S = 0.64
+"""More packets in one tick than the sensor gives in this time are a flood; the oldest go."""
 
 Fold = Callable[[TickState, TickInput], tuple[TickState, TickOutput]]
 
@@ -83,6 +85,7 @@ class ControlLoop:
         state: TickState,
         *,
         rate_hz: float,
+        sensor_rate_hz: float,
         sensor: Sensor,
         arm: Arm,
         base: GateLink,
@@ -103,6 +106,11 @@ class ControlLoop:
         self._loop = EventLoop()
         self._timer: Timer | None = None
         self._tick = -1
+        self._most_readings = round(FLOOD_S * sensor_rate_hz)
+        self._health = sensor.health()
+        self._sensor_fd = -1
+        self._sensor_error: Exception | None = None
+        self._taken = 0
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator = Operator.NONE
         self._arm_record = ArmRecord()
@@ -114,7 +122,8 @@ class ControlLoop:
 
     def run(self) -> None:
         """Serve until finished. An exception in a tick sends zero, is logged as F68, and is left in `error`."""
-        self._loop.add_fd(self._sensor.fileno(), self._on_sensor)
+        self._sensor_fd = self._sensor.fileno()
+        self._loop.add_fd(self._sensor_fd, self._on_sensor)
         self._loop.add_fd(self._operator_fd, self._on_operator)
         for name, pidfd in self._watch.pidfds.items():
             self._loop.add_fd(pidfd, partial(self._on_gone, name))
@@ -131,12 +140,25 @@ class ControlLoop:
 
     def _on_sensor(self, _events: int) -> None:
         self._collect()
-        if self._sensor.health().state == LinkState.LOST:
-            self._loop.remove_fd(self._sensor.fileno())
+        if self._health.state == LinkState.LOST:
+            self._loop.remove_fd(self._sensor_fd)
 
     def _collect(self) -> None:
-        self._readings.extend(self._sensor.drain())
-        del self._readings[:-MAX_READINGS]
+        """Take every new reading; what somebody else's driver raises is left for the next tick to give up on."""
+        if self._sensor_error is not None:
+            return
+        try:
+            readings = self._sensor.drain()
+            self._health = self._sensor.health()
+        except Exception as error:
+            self._sensor_error = error
+            self._loop.remove_fd(self._sensor_fd)
+            return
+        now_ns = self._clock()
+        for reading in readings:  # a stamp from the future would never grow old
+            self._readings.append(reading if reading.received_ns <= now_ns else replace(reading, received_ns=now_ns))
+        self._taken += len(readings)
+        del self._readings[: -self._most_readings]
 
     def _on_operator(self, _events: int) -> None:
         try:
@@ -167,6 +189,8 @@ class ControlLoop:
         # Drained first: packets that waited during a pause are in before anybody judges their age.
         inp = self._input(self._clock(), paced.late_ns, paced.skipped)
         try:
+            if self._sensor_error is not None:
+                raise self._sensor_error
             self._one_tick(inp)
         except Exception as error:  # the loop's top: whatever failed up there, the base gets zero and the log says so
             self._give_up(inp, error)
@@ -220,7 +244,6 @@ class ControlLoop:
         record = self._arm.read()
         if record is not None:
             self._arm_record = record
-        health = self._sensor.health()
         readings, self._readings = self._readings, []
         operator, self._operator = self._operator, Operator.NONE
         return TickInput(
@@ -236,16 +259,16 @@ class ControlLoop:
                 False,
                 self._ring.dropped,
             ),
-            ft_input(readings, health),
+            ft_input(readings, self._health, self._taken),
             self._arm_record,
             self._base.read(),
         )
 
 
 def ft_input(
-    readings: list[Stamped[SensorWrench]] | tuple[Stamped[SensorWrench], ...], health: DeviceHealth
+    readings: list[Stamped[SensorWrench]] | tuple[Stamped[SensorWrench], ...], health: DeviceHealth, taken: int
 ) -> FtInput:
-    """Return the sensor's part of a tick's input."""
+    """Return the sensor's part of a tick's input; `taken` counts all readings, for a driver that does not."""
     counters = health.counters
     return FtInput(
         tuple(
@@ -253,7 +276,7 @@ def ft_input(
             for s in readings
         ),
         int(health.state),
-        counters["packets_ok"],
+        counters.get("packets_ok", taken),
         counters.get("crc_fail", 0),
         counters.get("junk_bytes", 0),
     )

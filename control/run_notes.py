@@ -1,4 +1,4 @@
-"""What a run says of itself at the end: when modes and faults changed, and how often each fault came."""
+"""What a run says of itself at the end: when faults came and went, how often each came, and how it ended."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ MOST_EVENTS = 200
 
 
 class RunNotes:
-    """Collects changes of phase, mode and faults, bounded, while the run goes on."""
+    """Collects when the set of active faults changed, with the mode of that tick, and how often each fault came.
+
+    At most MOST_EVENTS events; the counts go on.
+    """
 
     def __init__(self) -> None:
         self.events: list[dict[str, object]] = []

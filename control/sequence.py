@@ -10,15 +10,13 @@ from control import open_loop, push_law
 from control.sensing import in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
-from control.tare import judge
+from control.tare import Judgement, judge
 from robot_io.messages import LinkState
-from robot_io.tick import ControlState, Operator, Phase, TareSums, TickInput
+from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Operator, Phase, TareSums, TickInput
 
 FRESH_NS = 100_000_000
 SETTLE_PACKETS = 20
 """Packets of each device before the start is believed."""
-REST_SPEED_M_PER_S = 0.01
-REST_NS = 300_000_000
 OVERDUE_CONTACT_M = 0.5
 """No contact this far beyond where it was expected: the object is not there."""
 BACKWARD_RAD = math.pi / 2
@@ -74,7 +72,7 @@ def _wait(settings: Settings, state: ControlState, inp: TickInput) -> ControlSta
 
 def _note_rest(state: ControlState, inp: TickInput) -> ControlState:
     twist = inp.base.odometry
-    rest = math.hypot(twist.vx, twist.vy) < REST_SPEED_M_PER_S and state.speed == 0.0
+    rest = math.hypot(twist.vx, twist.vy) < REST_M_PER_S and state.speed == 0.0
     since = (state.rest_since_ns or inp.now_ns) if rest else 0
     return state if since == state.rest_since_ns else replace(state, rest_since_ns=since)
 
@@ -84,11 +82,11 @@ def _rested(state: ControlState, now_ns: int, for_ns: int) -> bool:
     return state.rest_since_ns > 0 and now_ns - max(state.rest_since_ns, state.phase_since_ns) >= for_ns
 
 
-def everyone_spoke(state: ControlState, inp: TickInput) -> bool:
+def everyone_spoke(settings: Settings, state: ControlState, inp: TickInput) -> bool:
     """Tell whether every device has given enough fresh data to start."""
     arm, base = inp.arm, inp.base
     return (
-        inp.ft.packets_ok >= SETTLE_PACKETS
+        inp.ft.packets_ok >= settings.settle_readings
         and inp.now_ns - state.last_reading_ns <= FRESH_NS
         and arm.link == LinkState.UP
         and arm.packets >= SETTLE_PACKETS
@@ -102,7 +100,7 @@ def everyone_spoke(state: ControlState, inp: TickInput) -> bool:
 
 
 def _settle(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
-    if not everyone_spoke(state, inp):
+    if not everyone_spoke(settings, state, inp):
         return state
     held = replace(state, held_yaw=inp.base.pose.yaw, approach_from_m=along)
     if settings.in_contact:
@@ -116,7 +114,7 @@ def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float)
         return replace(state, tare=TareSums())
     if state.refusal or state.tare.count < settings.tare_readings:
         return state
-    judged = judge(state.tare, settings.ft.noise_force_N, settings.ft.noise_torque_Nm)
+    judged = judge_tare(settings, state)
     if judged.refusal:
         return replace(state, refusal=int(judged.refusal))
     bias = judged.tare.bias
@@ -133,7 +131,7 @@ def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float)
 
 def _approach(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
     control = settings.control
-    if state.contact_run >= control.contact_samples:
+    if state.contact_run >= settings.contact_readings:
         return _enter(
             state,
             Phase.PUSH,
@@ -243,5 +241,10 @@ def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlSt
         return replace(state, speed=0.0, tare=TareSums())
     if state.tare.count < settings.tare_readings:
         return state
-    mean = judge(state.tare, settings.ft.noise_force_N, settings.ft.noise_torque_Nm).tare.bias
+    mean = judge_tare(settings, state).tare.bias
     return _enter(state, Phase.DONE, inp.now_ns, residual_N=math.dist(mean[:3], state.bias_force))
+
+
+def judge_tare(settings: Settings, state: ControlState) -> Judgement:
+    """Return what the readings summed up so far come to, by what the sensor declares of itself."""
+    return judge(state.tare, settings.sensor_noise, settings.sensor_range, settings.sensor_resolution)

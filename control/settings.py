@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import msgspec
 
-from control.path import StraightPath
-from robot_io.rig.config import ControlConfig, FtConfig, RigConfig
+from control.tare import SMALLEST_COUNT
+from robot_io.geometry import StraightPath
+from robot_io.messages import Vector6
+from robot_io.rig.config import ControlConfig, RigConfig
 from robot_io.rig.types import Matrix3
+
+CONTACT_RATE_HZ = 100.0
+"""`contact_samples` counts readings at this rate."""
+SETTLE_S = 0.2
 
 
 class Settings(msgspec.Struct, frozen=True, gc=False):
     """Gains, path and constants of the rig; `in_contact` starts without approach, with a saved tare."""
 
     control: ControlConfig
-    ft: FtConfig
+    sensor_noise: Vector6
+    """One standard deviation of each axis at rest: N, N*m."""
+    sensor_range: Vector6
+    """The largest reading of each axis: N, N*m."""
+    sensor_resolution: Vector6
+    """The smallest step of each axis: N, N*m."""
     path: StraightPath
     base_from_sensor: Matrix3
     contact_x: float
@@ -25,7 +36,11 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     period_s: float
     """Period of the loop, s."""
     tare_readings: int
-    """How many readings a tare needs; the sensor gives 100 in a second."""
+    """How many readings a tare needs, at the rate that the sensor declares."""
+    settle_readings: int
+    """How many readings the sensor must have given before anything begins."""
+    contact_readings: int
+    """How many readings in a row above the threshold are contact."""
     in_contact: bool
 
     @classmethod
@@ -34,14 +49,18 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
         contact_x, contact_y, _ = rig.frames.contact_in_base_m
         return cls(
             rig.control,
-            rig.ft,
-            StraightPath.of(rig.path),
+            rig.ft.noise,
+            rig.ft.declared.range,
+            rig.ft.declared.resolution,
+            StraightPath.of(rig.path.origin_m, rig.path.direction_deg),
             rig.frames.base_from_sensor,
             contact_x,
             contact_y,
             rig.path.expected_contact_m,
             max(rig.control.ramp_s, rig.control.push_speed_m_per_s / rig.limits.max_acceleration_m_per_s2),
             1.0 / rig.loop.rate_hz,
-            round(100 * rig.ft.tare_seconds_s),
+            round(rig.ft.declared.rate_hz * rig.ft.tare_s),
+            max(SMALLEST_COUNT, round(SETTLE_S * rig.ft.declared.rate_hz)),
+            max(1, round(rig.control.contact_samples * rig.ft.declared.rate_hz / CONTACT_RATE_HZ)),
             in_contact,
         )

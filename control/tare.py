@@ -1,9 +1,8 @@
-"""Software tare of the FT 300: the mean of samples at rest, or a reason why it cannot be trusted. Pure.
+"""Software tare of the force-torque sensor: the mean of samples at rest, or a reason why it cannot be trusted. Pure.
 
-The sensor has no zero command, and its bias of tens of newtons changes at every power cycle. The mean holds bias
+The FT 300 has no zero command, and its bias of tens of newtons changes at every power cycle. The mean holds bias
 and tool weight together, so it is valid only while the arm keeps its pose and the base stays level.
-The samples are folded into sums one by one (`add`), then judged (`judge`): the control loop does it as they come,
-`tare` does it for samples already collected.
+The samples are folded into sums one by one as they come (`add`), then judged (`judge`).
 """
 
 from __future__ import annotations
@@ -14,11 +13,8 @@ from enum import IntEnum
 
 import msgspec
 
-from robot_io.errors import DeviceNotReady
-from robot_io.messages import SensorWrench
+from robot_io.messages import Vector6
 from robot_io.tick import TareSums
-
-Vector6 = tuple[float, float, float, float, float, float]
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 UNITS = ("N", "N", "N", "N*m", "N*m", "N*m")
@@ -27,9 +23,9 @@ NOISE_FACTOR = 2.0
 """Refuse a standard deviation above this many times the sensor's own noise."""
 DRIFT_STANDARD_ERRORS = 4.0
 DRIFT_FLOOR = (0.1, 0.1, 0.1, 0.005, 0.005, 0.005)
-"""Drift that is always allowed (N, N*m): the resolution of the sensor and what no push would notice."""
-BIAS_LIMIT = (150.0, 150.0, 150.0, 15.0, 15.0, 15.0)
-"""Half of the measuring range (N, N*m): a greater bias leaves too little of it for pushing."""
+"""Drift that is always allowed (N, N*m): no push would notice it. A sensor's own resolution where that is coarser."""
+BIAS_SHARE = 0.5
+"""A bias above this share of the range leaves too little of it for pushing."""
 SMALLEST_COUNT = 8
 """Fewer samples do not make quarters."""
 
@@ -80,12 +76,13 @@ def add(sums: TareSums, values: Vector6, wanted: int) -> TareSums:
     )
 
 
-def judge(sums: TareSums, noise_force_N: float, noise_torque_Nm: float) -> Judgement:
+def judge(sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vector6) -> Judgement:
     """Return the tare of complete sums (at least SMALLEST_COUNT samples) and whether it can be trusted.
 
-    The noise is the sensor's own, one standard deviation per axis. Refused: a reading that is not finite, one
-    that moves (standard deviation above twice the noise, or a drift from the first to the last quarter beyond
-    4 standard errors and a small floor), a bias that leaves less than half of the range.
+    noise, sensor_range, resolution: the sensor's own, per axis (N, N*m); the noise is one standard deviation.
+    Refused: a reading that is not finite, one that moves (standard deviation above twice the noise, or a drift from
+    the first to the last quarter beyond 4 standard errors and a small floor), a bias that leaves less than half of
+    the range.
     """
     n, quarter = sums.count, sums.count // 4
     moments = [_mean_sd(sums.total[i], sums.squares[i], n) for i in range(6)]
@@ -96,49 +93,25 @@ def judge(sums: TareSums, noise_force_N: float, noise_torque_Nm: float) -> Judge
         unit = UNITS[i]
         if not math.isfinite(bias[i]):
             return Judgement(result, Refusal.UNSETTLED, f"{name} is {bias[i]}", "Check the sensor")
-        noise = noise_force_N if i < 3 else noise_torque_Nm
-        sd = moments[i][1]
-        if not sd <= NOISE_FACTOR * noise:
-            what = f"{name} is not settled: it varies by {sd:.3g} {unit} (at most {NOISE_FACTOR * noise:.3g})"
+        sd, most = moments[i][1], NOISE_FACTOR * max(noise[i], resolution[i] / 2)
+        if not sd <= most:
+            what = f"{name} is not settled: it varies by {sd:.3g} {unit} (at most {most:.3g})"
             return Judgement(result, Refusal.UNSETTLED, what, wait)
         mean_first, sd_first = _mean_sd(sums.first[i], sums.first_squares[i], quarter)
         mean_last, sd_last = _mean_sd(sums.last[i], sums.last_squares[i], quarter)
         # Noise within the quarters, because over all samples a drift would excuse itself.
         variance = (sd_first**2 + sd_last**2) / 2
-        allowed = DRIFT_STANDARD_ERRORS * math.sqrt(2 * variance / quarter) + DRIFT_FLOOR[i]
+        allowed = DRIFT_STANDARD_ERRORS * math.sqrt(2 * variance / quarter) + max(DRIFT_FLOOR[i], resolution[i])
         drift = mean_last - mean_first
         if not abs(drift) <= allowed:
             what = f"{name} is not settled: it drifts by {drift:.3g} {unit} (at most {allowed:.3g})"
             return Judgement(result, Refusal.UNSETTLED, what, wait)
-        if not abs(bias[i]) <= BIAS_LIMIT[i]:
-            what = (
-                f"{name} reads {bias[i]:.3g} {unit} at rest, which leaves too little range "
-                f"(limit {BIAS_LIMIT[i]:g} {unit})"
-            )
+        limit = BIAS_SHARE * sensor_range[i]
+        if not abs(bias[i]) <= limit:
+            what = f"{name} reads {bias[i]:.3g} {unit} at rest, which leaves too little range (limit {limit:g} {unit})"
             do = "Make sure that nothing presses on the tool; power-cycle the sensor"
             return Judgement(result, Refusal.SATURATED, what, do)
     return Judgement(result)
-
-
-def tare(samples: Sequence[SensorWrench], noise_force_N: float, noise_torque_Nm: float, *, needed: int = 100) -> Tare:
-    """Return the mean of `samples` (in order of time, at rest, out of contact).
-
-    Raises DeviceNotReady when there are fewer than `needed` samples (at least SMALLEST_COUNT), and where `judge`
-    refuses.
-    """
-    needed = max(needed, SMALLEST_COUNT)
-    if len(samples) < needed:
-        raise DeviceNotReady(
-            f"only {len(samples)} of {needed} samples came", where="ft300 tare", do="Check that the sensor streams"
-        )
-    sums = TareSums()
-    for sample in samples:
-        values = (sample.fx, sample.fy, sample.fz, sample.mx, sample.my, sample.mz)
-        sums = add(sums, values, len(samples))
-    judged = judge(sums, noise_force_N, noise_torque_Nm)
-    if judged.refusal:
-        raise DeviceNotReady(judged.what, where="ft300 tare", do=judged.do)
-    return judged.tare
 
 
 def _mean_sd(total: float, squares: float, n: int) -> tuple[float, float]:

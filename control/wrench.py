@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from robot_io.rig.types import Matrix3, Vector3
+from robot_io.messages import Vector3
+from robot_io.rig.types import Matrix3
 
 
 def force_on_slider_world(

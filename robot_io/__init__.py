@@ -15,10 +15,12 @@ from robot_io._lazy import exports
 
 if TYPE_CHECKING:
     from robot_io.ft300.driver import Ft300
+    from robot_io.kinds import open_device
     from robot_io.ridgeback.driver import Ridgeback
     from robot_io.ur10.driver import Ur10
 
-__all__ = ["Ft300", "Ridgeback", "Ur10", "errors", "messages"]
+__version__ = "0.1.0"
+__all__ = ["Ft300", "Ridgeback", "Ur10", "errors", "messages", "open_device"]
 
 __getattr__ = exports(
     __name__,
@@ -26,5 +28,6 @@ __getattr__ = exports(
         "Ft300": "ft300.driver",
         "Ridgeback": "ridgeback.driver",
         "Ur10": "ur10.driver",
+        "open_device": "kinds",
     },
 )

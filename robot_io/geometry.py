@@ -1,8 +1,10 @@
-"""Planar poses, pure: heading of a quaternion, composition and inverse of poses on the floor."""
+"""The plane, pure: vectors and points between frames, headings, poses on the floor, and the straight path."""
 
 from __future__ import annotations
 
 import math
+
+import msgspec
 
 from robot_io.messages import Pose2D
 
@@ -24,19 +26,33 @@ def yaw_from_quaternion(x: float, y: float, z: float, w: float) -> float | None:
 
 
 def wrap_angle(angle: float) -> float:
-    """Return the angle (rad) in (-pi, pi]."""
+    """Return the angle (rad) in (-pi, pi]; NaN stays NaN."""
     turned = math.remainder(angle, math.tau)
-    return turned if turned > -math.pi else math.pi
+    return math.pi if turned == -math.pi else turned
+
+
+def rotated(x: float, y: float, angle: float) -> tuple[float, float]:
+    """Return a vector given in a frame turned by `angle` (rad, counter-clockwise) as seen from outside that frame."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return cosine * x - sine * y, sine * x + cosine * y
+
+
+def seen_from_frame(x: float, y: float, angle: float) -> tuple[float, float]:
+    """Return a vector as seen from a frame turned by `angle` (rad, counter-clockwise): the inverse of `rotated`."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return cosine * x + sine * y, cosine * y - sine * x
+
+
+def point_outside(frame_x: float, frame_y: float, angle: float, x: float, y: float) -> tuple[float, float]:
+    """Return the point (x, y) of a frame at (frame_x, frame_y), turned by `angle` (rad), as seen from outside."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return frame_x + cosine * x - sine * y, frame_y + sine * x + cosine * y
 
 
 def compose(outer: Pose2D, inner: Pose2D) -> Pose2D:
     """Return `inner`, given in the frame of `outer`, in the frame in which `outer` is given."""
-    cosine, sine = math.cos(outer.yaw), math.sin(outer.yaw)
-    return Pose2D(
-        outer.x + cosine * inner.x - sine * inner.y,
-        outer.y + sine * inner.x + cosine * inner.y,
-        wrap_angle(outer.yaw + inner.yaw),
-    )
+    x, y = point_outside(outer.x, outer.y, outer.yaw, inner.x, inner.y)
+    return Pose2D(x, y, wrap_angle(outer.yaw + inner.yaw))
 
 
 def inverse(pose: Pose2D) -> Pose2D:
@@ -48,3 +64,45 @@ def inverse(pose: Pose2D) -> Pose2D:
 def base_pose_from_marker(marker_in_world: Pose2D, base_from_marker: Pose2D) -> Pose2D:
     """Return the pose of the base from the pose of its markers, which sit at `base_from_marker` in the BODY frame."""
     return compose(marker_in_world, inverse(base_from_marker))
+
+
+class StraightPath(msgspec.Struct, frozen=True, gc=False):
+    """A line in the WORLD frame: origin in m, heading in rad, and its cosine and sine.
+
+    The PATH frame has its x axis along the direction of travel and y to the left; angles are counter-clockwise.
+    """
+
+    origin_x: float
+    origin_y: float
+    heading: float
+    cos: float
+    sin: float
+
+    @classmethod
+    def of(cls, origin_m: tuple[float, float], direction_deg: float) -> StraightPath:
+        """Build the path through a WORLD point in a WORLD direction."""
+        heading = math.radians(direction_deg)
+        return cls(origin_m[0], origin_m[1], heading, math.cos(heading), math.sin(heading))
+
+    def along(self, x_world: float, y_world: float) -> float:
+        """Return how far a WORLD point (m) lies along the path from its origin, in m."""
+        return (x_world - self.origin_x) * self.cos + (y_world - self.origin_y) * self.sin
+
+    def lateral(self, x_world: float, y_world: float) -> float:
+        """Return the lateral offset of a WORLD point from the path in m, left positive (y_c of the paper)."""
+        return (y_world - self.origin_y) * self.cos - (x_world - self.origin_x) * self.sin
+
+    def vector_to_path(self, x_world: float, y_world: float) -> tuple[float, float]:
+        """Rotate a WORLD vector into the PATH frame."""
+        return x_world * self.cos + y_world * self.sin, y_world * self.cos - x_world * self.sin
+
+    def point_in_world(self, along: float, lateral: float) -> tuple[float, float]:
+        """Return a PATH point (m) in the WORLD frame."""
+        return (
+            self.origin_x + self.cos * along - self.sin * lateral,
+            self.origin_y + self.sin * along + self.cos * lateral,
+        )
+
+    def direction_in_world(self, theta: float) -> tuple[float, float]:
+        """Return the WORLD unit vector of a PATH angle in rad."""
+        return math.cos(self.heading + theta), math.sin(self.heading + theta)

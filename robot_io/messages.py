@@ -1,8 +1,8 @@
 """The message types that flow between drivers, control and safety.
 
 Frames: WORLD is the fixed frame of the base localisation (x, y on the floor, z up, yaw about z). BODY is the
-base's own frame (x forward, y left). SENSOR is the FT 300's frame (+z out of the tool side). A twist or a
-wrench in one frame is a different type from the same in another, so that a mix-up is a type error.
+base's own frame (x forward, y left). SENSOR is the frame of the force-torque sensor (FT 300: +z out of the tool
+side). A twist or a wrench in one frame is a different type from the same in another, so that a mix-up is a type error.
 All are frozen, built of floats, ints and tuples, in SI units.
 """
 
@@ -14,7 +14,9 @@ from typing import ClassVar, Generic, TypeVar
 import msgspec
 
 T = TypeVar("T")
+Vector3 = tuple[float, float, float]
 _NAN = float("nan")
+Vector6 = tuple[float, float, float, float, float, float]
 
 
 class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
@@ -27,7 +29,7 @@ class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
 
 
 class SensorWrench(msgspec.Struct, frozen=True, gc=False):
-    """What the FT 300 reports: N and N*m in the SENSOR frame, bias and tool weight still in it."""
+    """What a force-torque sensor reports: N and N*m in the SENSOR frame, bias and tool weight still in it."""
 
     fx: float
     fy: float
@@ -61,20 +63,34 @@ class Pose2D(msgspec.Struct, frozen=True, gc=False):
     yaw: float = 0.0
 
 
-Joints = tuple[float, float, float, float, float, float]
+Joints = Vector6
+
+
+class ArmState(IntEnum):
+    """What an arm's driver makes of its controller's own modes and bits."""
+
+    UNKNOWN = 0
+    HOLDING = 1
+    """Powered, brakes released, standing where it is."""
+    MOVING = 2
+    """It moves, or may be moved by hand."""
+    PROTECTIVE_STOP = 3
+    """Stopped by its own safety functions, or by a safeguard."""
+    EMERGENCY_STOP = 4
+    OFF = 5
+    """Powered off, booting, or with brakes on: as a whole or at one joint."""
+    FOREIGN_PROGRAM = 6
+    """A program that is not ours is running, or paused, and may move it."""
 
 
 class JointState(msgspec.Struct, frozen=True, gc=False):
-    """State of the arm: rad, rad/s, and the controller's own mode numbers (UR RTDE guide, CB3)."""
+    """State of the arm: rad, rad/s, an `ArmState`, and the time of its controller (s)."""
 
     position: Joints
     velocity: Joints
-    robot_mode: int
-    safety_mode: int
-    safety_bits: int
-    robot_status_bits: int
-    runtime_state: int
-    speed_scaling: float
+    state: int
+    device_state: int
+    """The controller's own modes, packed by its driver: for the log and its maker's manual, judged by nobody."""
     controller_time_s: float
 
 
@@ -180,9 +196,7 @@ class ArmRecord(msgspec.Struct, frozen=True, gc=False):
     """Newest state of the arm: joints (rad, rad/s), times in CLOCK_MONOTONIC ns, 0 where there is none yet."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/ArmRecord"
-    joints: JointState = JointState(ZERO_JOINTS, ZERO_JOINTS, -1, 0, 0, 0, 0, 0.0, 0.0)
-    joint_modes: tuple[int, int, int, int, int, int] = (0, 0, 0, 0, 0, 0)
-    """Mode of each joint (253: running)."""
+    joints: JointState = JointState(ZERO_JOINTS, ZERO_JOINTS, ArmState.UNKNOWN, 0, 0.0)
     packets: int = 0
     """How many packets of the controller were seen; the sequence number of `joints`."""
     published_ns: int = 0
@@ -226,13 +240,16 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     accepted_seq: int = 0
     """Sequence number of the last frame of control that the gate accepted."""
     verdict: int = 0
-    """The gate's verdict on the newest frame it read (0: accepted)."""
+    """Why the gate did not accept the newest frame that it read (a `Latch` number; 0: it did).
+
+    After a latch this is its cause, whatever the frame. A latch without a frame shows in `latch_cause` alone."""
     sent: BodyTwist = BodyTwist()
     """What really went out last."""
     sent_ns: int = 0
     latched: bool = False
     """The gate sends nothing but zero until it is restarted."""
     latch_cause: int = 0
+    """The `Latch` that came first, 0: none."""
     published_ns: int = 0
     """When this record was written."""
 

@@ -13,10 +13,8 @@ from typing import Annotated, ClassVar
 import msgspec
 
 from robot_io.cdr.cdr_type import CdrType
-from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, WorldTwist
+from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, Vector3, Vector6, WorldTwist
 
-Vector3 = tuple[float, float, float]
-Vector6 = tuple[float, float, float, float, float, float]
 _ZERO6: Vector6 = (0.0,) * 6
 U32 = Annotated[int, "uint32"]
 
@@ -43,6 +41,12 @@ class Phase(IntEnum):
     """At rest, out of contact: does the sensor still read zero?"""
     DONE = 9
     FAILED = 10
+
+
+REST_M_PER_S = 0.01
+"""The base counts as being at rest below this measured speed ..."""
+REST_NS = 300_000_000
+"""... once it has stayed so for this long."""
 
 
 class Mode(IntEnum):

@@ -6,7 +6,7 @@ import math
 
 from msgspec.structs import replace
 
-from robot_io.messages import LinkState
+from robot_io.messages import ArmState, LinkState
 from robot_io.tick import ControlState, SafetyState, TickInput
 from safety.settings import SafetySettings
 
@@ -15,22 +15,6 @@ STALE_HOLD_NS = 40_000_000
 STALE_STOP_NS = 100_000_000
 MAX_JOINT_SPEED_RAD_PER_S = 0.02
 JOINT_SPEED_PACKETS = 2
-
-ROBOT_MODE_RUNNING = 7
-"""UR RTDE guide: robot_mode."""
-RUNTIME_STOPPED = 1
-"""UR RTDE guide: runtime_state."""
-JOINT_MODE_RUNNING = 253
-NORMAL_OR_REDUCED = 0b11
-SAFETY_NORMAL, SAFETY_REDUCED = 1, 2
-SAFETY_EMERGENCY = (6, 7)
-"""UR RTDE guide: safety_mode, which says the same as the bits and is believed as well."""
-EMERGENCY = (1 << 5) | (1 << 6) | (1 << 7)
-ANY_STOP = 0b11111111100
-"""UR RTDE guide: safety_status_bits, bits 2 to 10."""
-TEACH_BUTTON = 1 << 2
-POWER_ON = 1
-"""UR RTDE guide: robot_status_bits."""
 
 
 def check(
@@ -55,9 +39,9 @@ def check(
     if not all(math.isfinite(v) for v in (*joints.position, *joints.velocity)):
         return state, [*faults, "F29"]
     drift = max(abs(q - held) for q, held in zip(joints.position, control.held_joints, strict=True))
-    if drift > settings.hold_stop:
+    if drift > settings.drift_stop:
         faults.append("F20-stop")
-    elif drift > settings.hold_slow:
+    elif drift > settings.drift_hold:
         faults.append("F20-hold")
     if any(abs(q - p) > settings.held_pose_tolerance for q, p in zip(joints.position, settings.held_pose, strict=True)):
         faults.append("R04")
@@ -66,23 +50,20 @@ def check(
         run = run + 1 if max(map(abs, joints.velocity)) > MAX_JOINT_SPEED_RAD_PER_S else 0
     if run >= JOINT_SPEED_PACKETS:
         faults.append("F21")
-    faults += _of_modes(settings, inp)
+    faults += _of_state(settings, inp)
     return replace(state, arm_packets=arm.packets, arm_velocity_run=run), faults
 
 
-def _of_modes(settings: SafetySettings, inp: TickInput) -> list[str]:
-    joints = inp.arm.joints
-    bits = joints.safety_bits
-    if bits & EMERGENCY or joints.safety_mode in SAFETY_EMERGENCY:
+def _of_state(settings: SafetySettings, inp: TickInput) -> list[str]:
+    state = inp.arm.joints.state
+    if state == ArmState.EMERGENCY_STOP:
         return ["F23"]
-    if bits & ANY_STOP or not bits & NORMAL_OR_REDUCED or joints.safety_mode not in (SAFETY_NORMAL, SAFETY_REDUCED):
+    if state == ArmState.PROTECTIVE_STOP:
         return ["F22"]
-    status = joints.robot_status_bits
-    running = joints.robot_mode == ROBOT_MODE_RUNNING and status & POWER_ON and not status & TEACH_BUTTON
-    if not running or any(mode != JOINT_MODE_RUNNING for mode in inp.arm.joint_modes):
-        return ["F27"]
-    if joints.runtime_state != RUNTIME_STOPPED and not settings.servo:
+    if state == ArmState.FOREIGN_PROGRAM:
         return ["F28"]
+    if state != ArmState.HOLDING:  # off, moved by hand, unknown, and a number that is no state at all
+        return ["F27"]
     if settings.servo and not inp.arm.servo:
         return ["F20-stop"]
     return []

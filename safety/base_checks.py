@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, Mode, SafetyState, TickInput
+from safety.envelope import OVERSPEED_FACTOR, too_fast
 from safety.gate import Latch
 from safety.settings import SafetySettings
 
@@ -16,7 +17,6 @@ STALE_STOP_NS = 250_000_000
 POSE_SLOW_PERIODS, POSE_STOP_PERIODS = 3, 6
 POSE_SLOW_FLOOR_NS, POSE_STOP_FLOOR_NS = 50_000_000, 120_000_000
 GATE_RECORD_STOP_NS = 100_000_000
-OVERSPEED_FACTOR = 1.3
 OVERSPEED_SAMPLES = 2
 IGNORE_SHARE = 0.5
 """Of the commanded speed: half of 0.1 m/s is the 0.05 m/s of the fault table ..."""
@@ -123,11 +123,7 @@ def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> 
     speed = math.hypot(twist.vx, twist.vy)
     run, seq = state.overspeed_run, state.overspeed_seq
     if base.odometry_seq != seq:
-        limits = settings.envelope
-        fast = not (
-            speed <= OVERSPEED_FACTOR * limits.speed and abs(twist.omega) <= OVERSPEED_FACTOR * limits.turn_rate
-        )
-        run, seq = (run + 1 if fast else 0), base.odometry_seq
+        run, seq = (run + 1 if too_fast(settings.envelope, twist) else 0), base.odometry_seq
     if run >= OVERSPEED_SAMPLES:
         faults.append("F35")
     sent = base.sent

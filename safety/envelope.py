@@ -16,14 +16,26 @@ SLOW_FACTOR = 0.5
 """In SLOW, at most half of what control wants."""
 
 
+OVERSPEED_FACTOR = 1.3
+"""A measured speed may exceed the limit by this much (noise, overshoot of the wheels) before it counts as too fast."""
+
+
 class EnvelopeLimits(msgspec.Struct, frozen=True, gc=False):
-    """m/s, rad/s, m/s^2, rad/s^2, and the tick's period in s."""
+    """What the envelope keeps to and the gate insists on: m/s, rad/s, m/s^2, rad/s^2, and the tick's period in ns."""
 
     speed: float
     turn_rate: float
     acceleration: float
     turn_acceleration: float
-    period_s: float
+    period_ns: int
+
+
+def too_fast(limits: EnvelopeLimits, measured: BodyTwist) -> bool:
+    """Return whether a measured velocity (BODY frame) is beyond the limits and their margin; NaN is."""
+    return not (
+        math.hypot(measured.vx, measured.vy) <= OVERSPEED_FACTOR * limits.speed
+        and abs(measured.omega) <= OVERSPEED_FACTOR * limits.turn_rate
+    )
 
 
 def apply(
@@ -49,8 +61,9 @@ def apply(
     if abs(omega) > limits.turn_rate:
         omega = math.copysign(limits.turn_rate, omega)
         clamped = True
-    vx, vy = _towards(state.last.vx, state.last.vy, vx, vy, limits.acceleration * limits.period_s)
-    step = limits.turn_acceleration * limits.period_s
+    period_s = limits.period_ns * 1e-9
+    vx, vy = _towards(state.last.vx, state.last.vy, vx, vy, limits.acceleration * period_s)
+    step = limits.turn_acceleration * period_s
     omega = state.last.omega + min(max(omega - state.last.omega, -step), step)
     command = BodyTwist(vx, vy, omega)
     return EnvelopeState(command, state.clamps + clamped, clamped), command

@@ -15,7 +15,7 @@ import msgspec
 
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
-from safety.settings import SafetySettings
+from safety.envelope import EnvelopeLimits, too_fast
 
 ZERO = BodyTwist()
 
@@ -27,7 +27,6 @@ STEP_MARGIN = 1.2
 """A step of the command may exceed the acceleration limit by this much (rounding, lateness)."""
 REPEAT_NS = 18_000_000
 """Unchanged or growing commands leave every 20 ms (less the jitter of a tick); reduced and zero ones leave at once."""
-OVERSPEED_FACTOR = 1.3
 OVERSPEED_SAMPLES = 3
 
 
@@ -78,24 +77,6 @@ LATCH_FAULT = {
 """The row of the fault table that a latch stands for; any other is F36, a command that may not pass."""
 
 
-class GateLimits(msgspec.Struct, frozen=True, gc=False):
-    """m/s, rad/s, m/s^2, rad/s^2, and the period of control's ticks in ns."""
-
-    speed: float
-    turn_rate: float
-    acceleration: float
-    turn_acceleration: float
-    period_ns: int
-
-    @classmethod
-    def of(cls, settings: SafetySettings) -> GateLimits:
-        """Return the limits of the envelope: what passed it passes the gate."""
-        envelope = settings.envelope
-        return cls(
-            envelope.speed, envelope.turn_rate, envelope.acceleration, envelope.turn_acceleration, settings.period_ns
-        )
-
-
 class GateState(msgspec.Struct, frozen=True, gc=False):
     """What the gate remembers: the last frame, what was sent last and when, and why it latched."""
 
@@ -111,7 +92,7 @@ class GateState(msgspec.Struct, frozen=True, gc=False):
     overspeed: int = 0
 
 
-def on_frame(limits: GateLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> GateState:
+def on_frame(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> GateState:
     """Judge one frame (None: nonsense) read at `now_ns`; a bad one latches."""
     if state.latch:
         return state
@@ -121,7 +102,7 @@ def on_frame(limits: GateLimits, state: GateState, frame: GateFrame | None, now_
     return GateState(Latch.NONE, frame.seq, frame.tick, now_ns, frame.twist, state.sent, state.sent_ns, state.overspeed)
 
 
-def on_frames(limits: GateLimits, state: GateState, frames: Sequence[GateFrame | None], now_ns: int) -> GateState:
+def on_frames(limits: EnvelopeLimits, state: GateState, frames: Sequence[GateFrame | None], now_ns: int) -> GateState:
     """Judge all frames that were waiting, oldest first; only the newest must be fresh.
 
     When the gate itself was held up for a moment, control's older frames waited: that is no fault of theirs.
@@ -143,13 +124,9 @@ def on_clock(state: GateState, now_ns: int) -> GateState:
     return state
 
 
-def on_speed(limits: GateLimits, state: GateState, twist: BodyTwist) -> GateState:
+def on_speed(limits: EnvelopeLimits, state: GateState, twist: BodyTwist) -> GateState:
     """Count measured speeds (odometry, BODY frame) beyond the envelope; three in a row latch."""
-    fast = not (
-        math.hypot(twist.vx, twist.vy) <= OVERSPEED_FACTOR * limits.speed
-        and abs(twist.omega) <= OVERSPEED_FACTOR * limits.turn_rate
-    )
-    count = state.overspeed + 1 if fast else 0
+    count = state.overspeed + 1 if too_fast(limits, twist) else 0
     state = msgspec.structs.replace(state, overspeed=count)
     return latched(state, Latch.OVERSPEED) if count >= OVERSPEED_SAMPLES and not state.latch else state
 
@@ -179,7 +156,7 @@ def sent(state: GateState, twist: BodyTwist, now_ns: int) -> GateState:
     return msgspec.structs.replace(state, sent=twist, sent_ns=now_ns)
 
 
-def _judge(limits: GateLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> Latch:
+def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> Latch:
     if frame is None:
         return Latch.NONSENSE
     if frame.seq != state.seq + 1:

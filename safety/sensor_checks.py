@@ -8,15 +8,12 @@ from msgspec.structs import replace
 
 from robot_io.messages import LinkState
 from robot_io.tick import ControlState, SafetyState, TickInput
-from safety.limits import SENSOR_RANGE_N, SENSOR_RANGE_NM
 from safety.settings import SafetySettings
 
 STALE_SLOW_NS = 50_000_000
 STALE_HOLD_NS = 80_000_000
 STALE_STOP_NS = 160_000_000
 """Robotiq's own driver calls a link bad after 160 ms without a valid packet."""
-FROZEN_PACKETS = 30
-SATURATED = 0.95
 
 
 def note(state: SafetyState, inp: TickInput) -> SafetyState:
@@ -44,7 +41,7 @@ def check(
         faults.append("F01-hold")
     elif age_ns > STALE_SLOW_NS:
         faults.append("F01-slow")
-    if settings.noise_floor and run >= FROZEN_PACKETS and control.speed > 0.0:
+    if settings.noise_floor and run >= settings.frozen_readings and control.speed > 0.0:
         faults.append("F06")
     return replace(state, last_ft_ns=last_ns, last_ft_force=force, last_ft_torque=torque, frozen_run=run), faults
 
@@ -58,7 +55,15 @@ def _of_reading(
     if not all(math.isfinite(value) for value in (*force, *torque)):
         return ["F10"]
     faults = []
-    if max(map(abs, force)) >= SATURATED * SENSOR_RANGE_N or max(map(abs, torque)) >= SATURATED * SENSOR_RANGE_NM:
+    most = settings.saturated
+    if (
+        abs(force[0]) >= most[0]
+        or abs(force[1]) >= most[1]
+        or abs(force[2]) >= most[2]
+        or abs(torque[0]) >= most[3]
+        or abs(torque[1]) >= most[4]
+        or abs(torque[2]) >= most[5]
+    ):
         faults.append("F07")
     if not control.tared:
         return faults

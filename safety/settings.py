@@ -6,10 +6,15 @@ import math
 
 import msgspec
 
-from robot_io.messages import Joints
-from robot_io.rig.config import RigConfig
+from robot_io.messages import Joints, Vector6
+from robot_io.rig.config import FtConfig, RigConfig
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
+
+SATURATED = 0.95
+"""Share of the sensor's range."""
+FROZEN_S = 0.3
+"""Readings that stay equal for this long, by the rate that the sensor declares, are a fault."""
 
 
 class SafetySettings(msgspec.Struct, frozen=True, gc=False):
@@ -19,13 +24,17 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     max_force: float
     slow_force: float
     max_torque: float
+    saturated: Vector6
+    """Readings from which on an axis is taken for saturated: N, N*m."""
+    frozen_readings: int
+    """This many equal readings in a row are a fault."""
     noise_floor: bool
     """The sensor's readings scatter, so that equal ones are a fault."""
     held_pose: Joints
     """Where the arm must be, rad: the frames of the rig are those of this pose."""
     held_pose_tolerance: float
-    hold_slow: float
-    hold_stop: float
+    drift_hold: float
+    drift_stop: float
     servo: bool
     max_heading_error: float
     pose_period_ns: int
@@ -36,17 +45,20 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     def of(cls, rig: RigConfig) -> SafetySettings:
         """Resolve the settings of a rig."""
         limits = rig.limits
-        period_s = 1.0 / rig.loop.rate_hz
+        period_ns = round(1e9 / rig.loop.rate_hz)
+        fx, fy, fz, mx, my, mz = rig.ft.declared.range
         return cls(
-            round(period_s * 1e9),
+            period_ns,
             limits.max_force_N,
             limits.slow_force_N,
             limits.max_torque_Nm,
-            rig.ft.noise_force_N > 0.0,
+            (fx * SATURATED, fy * SATURATED, fz * SATURATED, mx * SATURATED, my * SATURATED, mz * SATURATED),
+            round(FROZEN_S * rig.ft.declared.rate_hz),
+            _scatters(rig.ft),
             rig.arm.held_pose_rad,
             rig.arm.held_pose_tolerance_rad,
-            limits.hold_slow_rad,
-            limits.hold_stop_rad,
+            limits.drift_hold_rad,
+            limits.drift_stop_rad,
             rig.arm.hold == "servo",
             math.radians(limits.max_heading_error_deg),
             round(1e9 / rig.base.pose_rate_hz),
@@ -56,6 +68,16 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
                 MAX_TURN_RATE_RAD_PER_S,
                 limits.max_acceleration_m_per_s2,
                 limits.max_yaw_acceleration_rad_per_s2,
-                period_s,
+                period_ns,
             ),
         )
+
+
+def _scatters(ft: FtConfig) -> bool:
+    """Return whether 30 equal readings in a row cannot be chance.
+
+    They cannot where the noise of an axis is a step of its resolution or more: the likeliest count then holds 0.38 of
+    the readings, and 0.38^30 is 3e-13. With half a step it is 1e-5, a false stop in an hour.
+    """
+    axes = zip(ft.noise, ft.declared.resolution, strict=True)
+    return ft.noise_force_N != 0.0 and any(noise >= step for noise, step in axes)

@@ -10,17 +10,15 @@ import msgspec
 from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
-from robot_io.tick import ControlState, Mode, Phase, SafetyState, TickInput
+from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Mode, Phase, SafetyState, TickInput
 from safety import arm_checks, base_checks, host_checks, sensor_checks, task_checks
 from safety.faults import FAULTS, Clears, strongest
 from safety.settings import SafetySettings
 
 CLEAN_NS = 1_000_000_000
-REST_NS = 300_000_000
-"""After a stop the run ends once the base was told zero for this long and is measured at rest ..."""
 REST_AT_MOST_NS = 1_500_000_000
-"""... or after this long, whatever is measured (the measurement itself may be what failed)."""
-REST_SPEED_M_PER_S = 0.01
+"""After a stop the run ends when the base is at rest, or after this long, whatever is measured: the measurement itself
+may be what failed."""
 HELD_NS = 2_000_000_000
 """A HOLD that cannot clear by itself ends the run after this long at zero."""
 STALENESS = ("F01", "F24", "F25", "F31", "F40", "F67-late")
@@ -153,7 +151,7 @@ def _ending(state: SafetyState, inp: TickInput, control: ControlState) -> tuple[
         zero_ns = inp.now_ns - state.stop_since_ns
         twist = inp.base.odometry
         # An unknown (NaN) speed compares false: it is not taken for rest.
-        rest = abs(twist.vx) < REST_SPEED_M_PER_S and abs(twist.vy) < REST_SPEED_M_PER_S
+        rest = abs(twist.vx) < REST_M_PER_S and abs(twist.vy) < REST_M_PER_S
         return (rest and zero_ns >= REST_NS) or zero_ns >= REST_AT_MOST_NS, code
     held = [i for i in state.latched if FAULTS[i].mode == Mode.HOLD]
     if held and state.mode == Mode.HOLD and state.zero_since_ns and inp.now_ns - state.zero_since_ns >= HELD_NS:

@@ -36,7 +36,7 @@ MARK = "PUSH_TEST_RUN"
 
 QUICK = (
     "--no-report",
-    *("--set", "ft.tare_seconds_s=0.3"),
+    *("--set", "ft.tare_s=0.3"),
     *("--set", "control.approach_speed_m_per_s=0.1"),
     *("--set", "control.ramp_s=0.3"),
     *("--set", "control.retreat_m=0.0"),

@@ -25,7 +25,7 @@ OFFENCES = {
         },
     ),
     "sim_backend/physics": ("socket", {"physics knows no wire, file or process"}),
-    "safety": ("control.path", {LAYERS}),
+    "safety": ("control.wrench", {LAYERS}),
     "tools/places": (
         "threading, tools.run",
         {"no asyncio, no threads, no multiprocessing of ours", "the rooms of tools"},

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-EXTRAS = {"runtime": "", "dev": "[dev,sweep,cluster]"}
+EXTRAS = {"runtime": "[app]", "dev": "[dev,sweep,cluster]"}
 OLDEST = (3, 11)
 WHEELS_BELOW = (3, 13)
 """ur_rtde comes ready-built for Pythons below this one; for newer ones it is compiled."""

@@ -5,28 +5,65 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from robot_io.errors import ConfigError
-from robot_io.rig.config import RigConfig, load_rig
+from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
+from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.types import Matrix3
+from tools.kinds import ask, is_shipped
 
 ROTATION_TOLERANCE = 1e-6
 
 
 def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
-    """Load a rig with its overrides and check all that its types cannot say.
+    """Load a rig with its overrides, ask its kinds what they declare, and check all that its types cannot say.
 
     Raises ConfigError (and UsageError for an override that is not `key=value`).
     """
     from safety import limits
 
-    rig = load_rig(name_or_path, overrides)
-    problems = _level_problems(rig) + _address_problems(rig)
+    rig, problems = _with_kinds(load_rig(name_or_path, overrides), folder_of(name_or_path))
+    problems += _level_problems(rig) + _address_problems(rig)
     if not is_rotation(rig.frames.base_from_sensor):
         problems.append("`frames.base_from_sensor` is not a rotation (orthonormal rows, determinant +1)")
     if problems:
         raise ConfigError("; ".join(problems), where=str(name_or_path), do="`push config show` prints the resolved rig")
     limits.check(rig)
     return rig
+
+
+def folder_of(name_or_path: str | Path) -> str:
+    """Return where modules of a rig's own kinds may be: its file's folder, the current one for a shipped rig."""
+    shipped = str(name_or_path) in shipped_rigs()
+    return str(Path.cwd() if shipped else Path(name_or_path).resolve().parent)
+
+
+def kinds_of(rig: RigConfig) -> dict[str, str]:
+    """Return the kind of each device: ft, arm, base."""
+    return {"ft": rig.ft.kind, "arm": rig.arm.kind, "base": rig.base.kind}
+
+
+def _with_kinds(rig: RigConfig, folder: str) -> tuple[RigConfig, list[str]]:
+    """Return the rig with what its sensor declares in it, and why a kind cannot be used at its level."""
+    rig = replace(rig, ft=replace(rig.ft, declared=FT300_FACTS))
+    own = {device: kind for device, kind in kinds_of(rig).items() if not is_shipped(device, kind)}
+    if not own:
+        return rig, []
+    told = ask(own, folder)
+    if "ft" in told and told["ft"].facts is not None:
+        rig = replace(rig, ft=replace(rig.ft, declared=told["ft"].facts))
+    problems = [
+        f"`{own[device]}` names no emulator, and {device} is at level emulated"
+        for device in devices_at(rig, "emulated")
+        if device in told and not told[device].emulated
+    ]
+    problems += [
+        f"`{own[device]}` cannot be simulated at level sim (a sensor of one's own can, arm and base cannot)"
+        for device in devices_at(rig, "sim")
+        if device in told and device != "ft"
+    ]
+    return rig, problems
 
 
 def devices_at(rig: RigConfig, level: str) -> list[str]:
@@ -62,11 +99,13 @@ def _level_problems(rig: RigConfig) -> list[str]:
 
 def _address_problems(rig: RigConfig) -> list[str]:
     addresses = {"ft.port": rig.ft.port, "arm.host": rig.arm.host, "base.url": rig.base.url}
+    # What a driver of somebody else needs as its address, only that driver knows.
+    shipped = [device for device in devices_at(rig, "hardware") if is_shipped(device, kinds_of(rig)[device])]
     problems = [
         f"`{key}` is missing, and {key.split('.')[0]} is at level hardware"
         for key, address in addresses.items()
-        if not address and key.split(".")[0] in devices_at(rig, "hardware")
+        if not address and key.split(".")[0] in shipped
     ]
-    if "base" in devices_at(rig, "hardware") and rig.base.url and not rig.base.url.startswith("ws://"):
+    if "base" in shipped and rig.base.url and not rig.base.url.startswith("ws://"):
         problems.append(f"`base.url` = {rig.base.url!r} does not start with ws://")
     return problems

@@ -43,6 +43,11 @@ class CdrType(Generic[MessageT]):
         self.schema_text = schema_text(shape)
         self._layout = Layout(shape)
 
+    @property
+    def fixed_size(self) -> bool:
+        """Whether all payloads have one size: no strings, no sequences."""
+        return self._layout.fixed
+
     def encode(self, value: MessageT) -> bytes:
         """Return the payload of `value`. Raises ValueError when a value does not fit its field."""
         out = bytearray(ENCAPSULATION)

@@ -47,6 +47,8 @@ class Layout:
         if run:
             self._parts.append(_Run(run))
         self.min_bytes = sum(part.min_bytes for part in self._parts)
+        self.fixed = all(isinstance(part, _Run) for part in self._parts)
+        """Whether all messages have one size, because none of its parts varies."""
         self._shape = shape
         # Compiled at their first use: most types of a run are never read, most of a log never written.
         self._build: Build | None = None

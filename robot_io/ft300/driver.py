@@ -17,16 +17,18 @@ A lost line is reported by `health`; only a fresh `open` brings it back, and the
 from __future__ import annotations
 
 from collections import deque
+from typing import ClassVar
 
 import msgspec
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
-from robot_io.driver import DriverBase
+from robot_io.driver import DriverBase, SensorFacts
 from robot_io.errors import DeviceNotReady, DeviceUnreachable
 from robot_io.ft300.codec import PACKET_BYTES, StreamParser, beyond_range, wrench_from_counts
 from robot_io.ft300.modbus import POWER_CYCLE, Ft300Registers
 from robot_io.ft300.serial_link import LINE_ERRORS, SerialLine
 from robot_io.messages import DeviceHealth, DeviceInfo, LinkState, SensorWrench, Stamped
+from robot_io.rig.declared import FT300_FACTS
 
 START_ATTEMPTS = 2
 FIRST_PACKET_LIMIT_S = 0.5
@@ -50,6 +52,8 @@ class Ft300Reading(msgspec.Struct, frozen=True, gc=False):
 
 class Ft300(DriverBase):
     """FT 300 at `port`: a device path, a pty or `socket://host:port`; `clock` stamps the samples (ns)."""
+
+    facts: ClassVar[SensorFacts] = FT300_FACTS
 
     def __init__(self, port: str, *, clock: ClockNs = monotonic_ns) -> None:
         self._port = port

@@ -9,9 +9,8 @@ from __future__ import annotations
 import socket
 
 from robot_io.clock import ClockNs, monotonic_ns
-from robot_io.ipc.base_record import BASE_RECORD_BYTES, unpack_base_record
 from robot_io.ipc.gate_frame import GateFrame, pack_frame
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import BASE_RECORD, TypedRecord
 from robot_io.messages import NO_BASE, BaseRecord, BodyTwist
 
 
@@ -22,7 +21,7 @@ class GateLink:
         """Take over both descriptors; the socket is made non-blocking."""
         self._gate = gate
         self._gate.setblocking(False)
-        self._record = SharedRecord(record_fd, BASE_RECORD_BYTES)
+        self._record = TypedRecord(record_fd, BASE_RECORD)
         self._clock = clock
         self._seq = 0
         self.alive = True
@@ -39,7 +38,7 @@ class GateLink:
     def read(self) -> BaseRecord:
         """Return the newest record of the gate (NO_BASE before the first)."""
         found = self._record.read()
-        return NO_BASE if found is None else unpack_base_record(found[1])
+        return NO_BASE if found is None else found[1]
 
     def close(self) -> None:
         """Close both ends: the gate takes the EOF for the end of control. Idempotent."""

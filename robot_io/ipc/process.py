@@ -31,13 +31,13 @@ def fresh_interpreter(module: str) -> tuple[list[str], dict[str, str]]:
     return [sys.executable, "-P", "-m", module], {**os.environ, "PYTHONPATH": os.pathsep.join([root, *others])}
 
 
-def die_with_parent(parent_pid: int = 0) -> None:
-    """Have the kernel kill this process (SIGKILL) when the process that started it dies.
+def die_with_parent(parent_pid: int = 0, with_signal: signal.Signals = signal.SIGKILL) -> None:
+    """Have the kernel send this process `with_signal` when the process (the thread of it) that started it dies.
 
     A parent that died before this call is noticed too, by getppid(2): exits at once, code 1. Give `parent_pid`
     (the starter's own pid, handed over by it) to be exact; without it, only a parent of pid 1 counts as gone.
     """
-    _libc.prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
+    _libc.prctl(_PR_SET_PDEATHSIG, int(with_signal), 0, 0, 0)
     now = os.getppid()
     if (parent_pid and now != parent_pid) or (not parent_pid and now == 1):
         os._exit(1)

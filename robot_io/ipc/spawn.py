@@ -1,19 +1,22 @@
-"""Child processes of a run: fresh interpreters, a job on stdin, JSON lines back."""
+"""Child processes: fresh interpreters, a job on stdin, JSON lines back."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import subprocess
 import tempfile
+import time
 from typing import IO, Any
 
 import msgspec
 from msgspec.structs import replace
 
+from robot_io.errors import PushError
 from robot_io.ipc.process import fresh_interpreter
-from robot_io.ipc.status import StatusReader
+from robot_io.ipc.status import StatusReader, error_of
 
 MOST_WORDS = 65_536
 """Bytes of a process's stderr that are looked at: its end."""
@@ -28,7 +31,7 @@ class Child:
         self.status = StatusReader(status_fd)
         self.ready: dict[str, Any] | None = None
         self.finished: dict[str, Any] | None = None
-        self.errors: list[dict[str, Any]] = []
+        self.errors: list[PushError] = []
         self._stderr = stderr
 
     @property
@@ -46,8 +49,21 @@ class Child:
             elif kind == "finished":
                 self.finished = event
             elif kind == "error":
-                self.errors.append(event.get("error", event))
+                self.errors.append(error_of(event))
         return events
+
+    def wait_ready(self, within_s: float) -> bool:
+        """Wait until it is ready, reports an error, ends, or the time is over; return whether it is ready."""
+        deadline_s = time.monotonic() + within_s
+        poll = select.poll()
+        poll.register(self.status.fd, select.POLLIN)
+        while self.status.open:
+            self.hear()
+            left_s = deadline_s - time.monotonic()
+            if self.ready is not None or self.errors or left_s <= 0:
+                break
+            poll.poll(left_s * 1000)
+        return self.ready is not None
 
     def last_words(self) -> str:
         """Return the last line it wrote on stderr, "" when there is none."""
@@ -86,6 +102,14 @@ class Child:
         with contextlib.suppress(ProcessLookupError):
             self.process.send_signal(signal.SIGTERM)
 
+    def stop(self, within_s: float) -> int:
+        """Ask it to end, and kill it when it has not within `within_s`; return its exit code. Idempotent."""
+        if self.process.poll() is None:
+            self.terminate()
+            self.process.send_signal(signal.SIGCONT)  # a stopped process acts on SIGTERM only when it continues
+            self.end(within_s)
+        return self.process.returncode
+
     def close(self) -> None:
         """Close our descriptors of it."""
         self.status.close()
@@ -95,8 +119,8 @@ class Child:
 def spawn(name: str, module: str, job: msgspec.Struct, fds: list[int]) -> Child:
     """Start `python -m module` with `job` on stdin; it inherits `fds`, and a pipe to report on as `job.status_fd`.
 
-    It gets a session of its own, so that Ctrl-C in the terminal reaches the launcher only. The caller closes its
-    copies of `fds`.
+    It gets a session of its own, so that Ctrl-C and Ctrl-Z in the terminal reach the caller only. The caller closes
+    its copies of `fds`.
     """
     listen_fd, status_fd = os.pipe()
     stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it

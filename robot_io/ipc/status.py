@@ -1,4 +1,10 @@
-"""How a child process speaks to the one that started it: JSON lines on a pipe, never blocking the speaker."""
+"""How a child process speaks to the one that started it: JSON lines on a pipe, never blocking the speaker.
+
+{"event": "ready", ...}        it does its work; what else is in it is for whoever started it
+{"event": "error", "kind": "DeviceUnreachable", "error": {"code": 4, "what": "...", "where": "...", "do": "..."}}
+{"event": "finished", ...}     its last word
+{"event": ..., ...}            anything else that the two agree on
+"""
 
 from __future__ import annotations
 
@@ -10,6 +16,7 @@ from typing import Any
 
 import msgspec
 
+from robot_io import errors
 from robot_io.errors import PushError
 
 
@@ -44,8 +51,19 @@ class StatusPipe:
         self._cut = bool(rest)
 
     def error(self, error: PushError) -> None:
-        """Send {"event": "error", "error": {code, what, where, do}}."""
-        self.say("error", error=error.as_json())
+        """Send an error with its kind."""
+        self.say("error", kind=type(error).__name__, error=error.as_json())
+
+
+def error_of(event: dict[str, Any]) -> PushError:
+    """Return the error that an event reports, of the kind that it was; a plain PushError for a kind unknown here."""
+    kind = getattr(errors, str(event.get("kind")), None)
+    if not (isinstance(kind, type) and issubclass(kind, PushError)):
+        kind = PushError
+    parts = event.get("error")
+    if not isinstance(parts, dict):
+        return kind(f"it reported {event!r}", do="This is a defect of the program")
+    return kind(str(parts.get("what", "")), where=str(parts.get("where", "")), do=str(parts.get("do", "")))
 
 
 class StatusReader:

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Message, Metadata
 
-from robot_io.log.mcap_walk import walk
+from robot_io.log.mcap_walk import Topic, walk
 
 
 class LogMessage(NamedTuple):
@@ -51,33 +51,27 @@ def read_log(path: Path) -> Iterator[LogMessage]:
 
     Raises UsageError when there is no such file, LogDamaged at the latest at the end: take all before trusting any.
     """
-    channels: dict[int, tuple[str, str]] = {}
-    schemas: dict[int, str] = {}
+    names: dict[int, tuple[str, str]] = {}
     for item in walk(path):
         if isinstance(item, Message):
-            topic, schema_name = channels[item.channel_id]
+            topic, schema_name = names[item.channel_id]
             yield LogMessage(topic, item.log_time, item.data, schema_name)
-        elif isinstance(item, Channel):
-            channels[item.id] = (item.topic, schemas[item.schema_id])
-        elif isinstance(item, Schema):
-            schemas[item.id] = item.name
+        elif isinstance(item, Topic):
+            names[item.channel.id] = (item.channel.topic, item.schema.name)
 
 
 def read_summary(path: Path) -> LogSummary:
     """Read a finished log to its end and return what it holds. Raises as `read_log`."""
     library, attachments, metadata = "", {}, {}
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
+    topics: list[Topic] = []
     counts: dict[int, int] = {}
     start_ns, end_ns = 2**64, 0
     for item in walk(path):
         if isinstance(item, Message):
             counts[item.channel_id] = counts.get(item.channel_id, 0) + 1
             start_ns, end_ns = min(start_ns, item.log_time), max(end_ns, item.log_time)
-        elif isinstance(item, Channel):
-            channels[item.id] = item
-        elif isinstance(item, Schema):
-            schemas[item.id] = item
+        elif isinstance(item, Topic):
+            topics.append(item)
         elif isinstance(item, Attachment):
             attachments[item.name] = item.data
         elif isinstance(item, Metadata):
@@ -87,12 +81,12 @@ def read_summary(path: Path) -> LogSummary:
     table = tuple(
         ChannelInfo(
             channel.topic,
-            schemas[channel.schema_id].name,
-            schemas[channel.schema_id].data.decode(errors="replace"),
+            schema.name,
+            schema.data.decode(errors="replace"),
             "offered_qos_profiles" in channel.metadata,
-            counts.get(channel_id, 0),
+            counts.get(channel.id, 0),
         )
-        for channel_id, channel in channels.items()
+        for channel, schema in topics
     )
     messages = sum(counts.values())
     return LogSummary(

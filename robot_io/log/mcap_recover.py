@@ -6,11 +6,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Message, Metadata
 
 from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
 from robot_io.log.mcap_log import CONFIG_ATTACHMENT, LIBRARY, PROFILE, create_new, finish_writer
-from robot_io.log.mcap_walk import LogItem, walk
+from robot_io.log.mcap_walk import LogItem, Topic, walk
 from robot_io.log.mcap_write import McapWriter
 from robot_io.log.seal import LogSeal, config_seal
 
@@ -73,28 +73,25 @@ class _Copy:
         self.writer = writer
         self.seal = LogSeal()
         self.config = b""
-        self._topics: dict[int, str] = {}
-        self._types: dict[int, Schema] = {}
         self._schemas: dict[int, int] = {}
-        self._channels: dict[int, int] = {}
+        self._channels: dict[int, tuple[int, str]] = {}
+        """New number and topic, by the old number."""
 
     def take(self, item: LogItem) -> None:
         """Append one record."""
         if isinstance(item, Message):
-            channel_id = self._channels[item.channel_id]
+            channel_id, topic = self._channels[item.channel_id]
             self.writer.add_message(channel_id, item.log_time, item.data, item.publish_time, item.sequence)
-            self.seal.note(self._topics[item.channel_id], item.log_time, item.data)
-        elif isinstance(item, Schema):
-            self._types[item.id] = item
-            self._schemas[item.id] = self.writer.register_schema(item.name, item.encoding, item.data)
-        elif isinstance(item, Channel):
-            self._topics[item.id] = item.topic
-            schema = self._types[item.schema_id]
-            self.seal.declare(item.topic, schema.name, schema.data)
-            schema_id = self._schemas[item.schema_id]
-            self._channels[item.id] = self.writer.register_channel(
-                item.topic, item.message_encoding, schema_id, item.metadata
+            self.seal.note(topic, item.log_time, item.data)
+        elif isinstance(item, Topic):
+            channel, schema = item
+            self.seal.declare(channel.topic, schema.name, schema.data)
+            if schema.id not in self._schemas:
+                self._schemas[schema.id] = self.writer.register_schema(schema.name, schema.encoding, schema.data)
+            channel_id = self.writer.register_channel(
+                channel.topic, channel.message_encoding, self._schemas[schema.id], channel.metadata
             )
+            self._channels[channel.id] = (channel_id, channel.topic)
         elif isinstance(item, Attachment):
             self.writer.add_attachment(item.create_time, item.log_time, item.name, item.media_type, item.data)
             if item.name == CONFIG_ATTACHMENT:

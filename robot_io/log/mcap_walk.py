@@ -17,7 +17,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -39,15 +39,22 @@ _MESSAGE = struct.Struct("<HIQQ")
 _MESSAGE_OPCODE = int(Opcode.MESSAGE)
 _FOOTER = struct.Struct("<BQQQI")
 
-LogItem = Header | Schema | Channel | Message | Attachment | Metadata
 
+class Topic(NamedTuple):
+    """A topic of a log, and the type of its messages."""
+
+    channel: Channel
+    schema: Schema
+
+
+LogItem = Header | Topic | Message | Attachment | Metadata
 
 Grown = Callable[[int], int]
 """Waits until a log has at least so many bytes or is no longer written, and returns its size."""
 
 
 def walk(path: Path, *, finished: bool = True, grown: Grown | None = None) -> Iterator[LogItem]:
-    """Yield the verified records of a log; each Schema and Channel once, before its first use.
+    """Yield the verified records of a log; each Topic once, before its first message.
 
     With `finished=False` everything before the first damage is yielded. With `grown` the log may still be written
     while it is read, and may be damaged in any part not yet yielded. Raises UsageError or LogDamaged.
@@ -146,7 +153,7 @@ class _Walk:
             body = data[at : at + length]
             at += length
             if opcode == Opcode.SCHEMA:
-                yield from self._schema(Schema.read(_stream(body)))
+                self._schema(Schema.read(_stream(body)))
             elif opcode == Opcode.CHANNEL:
                 yield from self._channel(Channel.read(_stream(body)))
 
@@ -164,21 +171,19 @@ class _Walk:
             data=data[at + _MESSAGE.size : at + length],
         )
 
-    def _schema(self, schema: Schema) -> Iterator[Schema]:
+    def _schema(self, schema: Schema) -> None:
         if schema.encoding != SCHEMA_ENCODING or len(schema.data) > _SCHEMA_LIMIT or len(self._schemas) > _TABLE_LIMIT:
             raise self._foreign(f"the schema of {schema.name[:100]} is not {SCHEMA_ENCODING}, or they are too many")
-        if self._schemas.setdefault(schema.id, schema) is schema:
-            yield schema
-        elif self._schemas[schema.id] != schema:
+        if self._schemas.setdefault(schema.id, schema) != schema:
             raise _altered(self._path, f"schema {schema.id} is declared twice")
 
-    def _channel(self, channel: Channel) -> Iterator[Channel]:
+    def _channel(self, channel: Channel) -> Iterator[Topic]:
         if channel.message_encoding != MESSAGE_ENCODING or len(self._channels) > _TABLE_LIMIT:
             raise self._foreign(f"{channel.topic[:100]} is not {MESSAGE_ENCODING}, or there are too many channels")
         if channel.schema_id not in self._schemas:
             raise _altered(self._path, f"{channel.topic[:100]} has no schema")
         if self._channels.setdefault(channel.id, channel) is channel:
-            yield channel
+            yield Topic(channel, self._schemas[channel.schema_id])
         elif self._channels[channel.id] != channel:
             raise _altered(self._path, f"channel {channel.id} is declared twice")
 

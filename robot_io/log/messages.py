@@ -54,6 +54,9 @@ class GateDecision(msgspec.Struct, frozen=True, gc=False):
     text: str
 
 
+GATE_SAYS = "gate: "
+"""How the text of an event begins that is the gate's own; all others are derived from ticks."""
+
 LOOP_TIMING = CdrType(LoopTiming, "push_msgs/msg/LoopTiming")
 SAFETY_EVENT = CdrType(SafetyEvent, "push_msgs/msg/SafetyEvent")
 GATE_DECISION = CdrType(GateDecision, "push_msgs/msg/GateDecision")

@@ -13,6 +13,7 @@ import msgspec
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.clock import NS_PER_S
+from robot_io.messages import BodyTwist
 
 Int32 = Annotated[int, "int32"]
 UInt32 = Annotated[int, "uint32"]
@@ -240,6 +241,8 @@ TF_MESSAGE = CdrType(TFMessage, TFMessage.__ros_name__)
 LOG = CdrType(Log, Log.__ros_name__)
 DIAGNOSTIC_ARRAY = CdrType(DiagnosticArray, DiagnosticArray.__ros_name__)
 
+WORLD_FRAME, BASE_FRAME, SENSOR_FRAME = "world", "base_link", "ft_sensor"
+"""The names that the frames WORLD, BODY and SENSOR have in a log."""
 UNKNOWN_COVARIANCE = (0.0,) * 36
 """All zero says nothing of the covariance, as ROS has it (nav_msgs/Odometry)."""
 
@@ -258,3 +261,8 @@ def yaw_quaternion(yaw_rad: float) -> Quaternion:
 def planar_pose(x_m: float, y_m: float, yaw_rad: float) -> Pose:
     """Return a pose in the plane z = 0."""
     return Pose(Point(x_m, y_m, 0.0), yaw_quaternion(yaw_rad))
+
+
+def planar_twist(twist: BodyTwist) -> Twist:
+    """Return a velocity in the plane."""
+    return Twist(Vector3(twist.vx, twist.vy, 0.0), Vector3(0.0, 0.0, twist.omega))

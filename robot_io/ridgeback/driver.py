@@ -16,11 +16,11 @@ The base itself stops 0.25 s after the last command.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import Literal
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, Self
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
-from robot_io.driver import DriverBase
+from robot_io.driver import DriverBase, no_more_options
 from robot_io.errors import ConfigError, DeviceNotReady, DeviceUnreachable
 from robot_io.messages import (
     BaseFeed,
@@ -107,6 +107,14 @@ class Ridgeback(DriverBase):
         self._counters = dict.fromkeys(
             ("messages", "undecodable", "sent", "held_back", "dropped_samples", "unanswered_checks", "pings"), 0
         )
+
+    @classmethod
+    def from_rig(cls, address: str, options: Mapping[str, Any]) -> Self:
+        """Return the base at a rig's url; `options` has its topics, pose source and marker, and no others."""
+        left = dict(options)
+        shared = {name: left.pop(name) for name in ("topics", "pose_source", "base_from_marker") if name in left}
+        no_more_options("ridgeback-rosbridge", left)
+        return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
         """Connect, check topics, advertise, subscribe; at most 3.5 s.

@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 import msgspec
 
 from robot_io.errors import ConfigError
+from robot_io.rig.renames import advice
 from robot_io.rig.toml import KeyPath, Origins
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -55,7 +56,9 @@ def _build(
     for key, value in data.items():
         here = (*path, key)
         if key not in fields:
-            mistakes.append((origin(here), f"unknown key `{'.'.join(here)}`{_nearest(key, list(fields))}"))
+            dotted = ".".join(here)
+            what = advice(dotted) or f"unknown key `{dotted}`{_nearest(key, list(fields))}"
+            mistakes.append((origin(here), what))
         elif _is_table(fields[key].type):
             if isinstance(value, Mapping):
                 built[key] = _build(fields[key].type, value, here, origin, mistakes)

@@ -15,12 +15,15 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
+from robot_io.driver import SensorFacts
 from robot_io.errors import ConfigError
+from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
+from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
-from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Positive, Table
+from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
 from robot_io.rig.world import WorldConfig
 
 RIGS_DIR = Path(__file__).parent
@@ -33,21 +36,42 @@ class LoopConfig(Table, frozen=True):
 
 
 class FtConfig(Table, frozen=True):
-    """The FT 300. `port`: a device path, a pty or `socket://host:port`; empty at levels sim and emulated."""
+    """The force-torque sensor. `port` is what its kind takes; empty at levels sim and emulated.
 
+    For `robotiq-ft300`: a device path, a pty or `socket://host:port`.
+    """
+
+    kind: str = "robotiq-ft300"
+    """A shipped kind, or `package.module:Class` on the Python path or beside the rig file (docs/add-a-device.md)."""
     level: Level = "emulated"
     port: str = ""
-    tare_seconds_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
-    """How long the tare is averaged, at 100 readings a second."""
-    noise_force_N: NonNegative = 1.2
-    """Noise of the sensor, one standard deviation of a force axis (FT 300 product sheet: 1.2 N)."""
-    noise_torque_Nm: NonNegative = 0.03
-    """The same of a torque axis."""
+    tare_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
+    """How long the tare is averaged."""
+    noise_force_N: NonNegative | None = None
+    """Noise of the sensor, one standard deviation of a force axis; without it what the kind declares (FT 300: 1.2)."""
+    noise_torque_Nm: NonNegative | None = None
+    """The same of a torque axis (FT 300: 0.03)."""
+    options: Options = msgspec.field(default_factory=dict)
+    """What the kind itself understands."""
+    declared: SensorFacts = FT300_FACTS
+    """What the kind declares of its sensor, filled in at the start of a run: not for you to write."""
+
+    @property
+    def noise(self) -> Vector6:
+        """One standard deviation of each axis: N, N*m."""
+        force, torque = self.declared.noise[:3], self.declared.noise[3:]
+        if self.noise_force_N is not None:
+            force = (self.noise_force_N,) * 3
+        if self.noise_torque_Nm is not None:
+            torque = (self.noise_torque_Nm,) * 3
+        return (*force, *torque)
 
 
 class ArmConfig(Table, frozen=True):
-    """The UR10. `hold = "monitor"` sends nothing to the arm; `"servo"` holds it actively (see the safety page)."""
+    """The arm. `hold = "monitor"` sends nothing to it; `"servo"` holds it actively (see the safety page)."""
 
+    kind: str = "ur"
+    """A shipped kind, or `package.module:Class`."""
     level: Level = "emulated"
     host: str = ""
     hold: Literal["monitor", "servo"] = "monitor"
@@ -55,17 +79,23 @@ class ArmConfig(Table, frozen=True):
     """Joints for which `[frames]` is given; an arm that is elsewhere is refused (R04)."""
     held_pose_tolerance_rad: Annotated[float, Meta(gt=0, le=0.2)] = 0.05
     """How far the measured joints may be from `held_pose_rad` at start."""
+    options: Options = msgspec.field(default_factory=dict)
+    """What the kind itself understands."""
 
 
 class BaseConfig(Table, frozen=True):
-    """The Ridgeback over rosbridge. `pose_source` says which topic localises the base."""
+    """The mobile base. `pose_source` says which topic localises it."""
 
+    kind: str = "ridgeback-rosbridge"
+    """A shipped kind, or `package.module:Class`."""
     level: Level = "emulated"
     url: str = ""
     pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
     """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
     """How often poses come: late after 3 periods, at least 50 ms, and lost after 6, at least 120 ms (F40)."""
+    options: Options = msgspec.field(default_factory=dict)
+    """What the kind itself understands."""
     topics: TopicsConfig = TopicsConfig()
 
 
@@ -120,7 +150,7 @@ class ControlConfig(Table, frozen=True):
     force_min_N: Annotated[float, Meta(gt=0, le=50)] = 5.0
     """Below this horizontal force there is no contact."""
     contact_samples: Annotated[int, Meta(ge=1, le=100)] = 5
-    """So many readings in a row above `force_min_N` are contact."""
+    """This many readings in a row above `force_min_N` are contact, at 100 a second; in proportion for other rates."""
     heading_gain_per_s: Annotated[float, Meta(ge=0, le=5)] = 1.0
     """Turn rate for each radian that the base has turned away from its heading at the start ..."""
     max_turn_rate_rad_per_s: Annotated[float, Meta(gt=0, le=0.25)] = 0.1
@@ -152,9 +182,9 @@ class LimitsConfig(Table, frozen=True):
     max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
     max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
     """Turned away this far from its heading at the start, the base stops (F44)."""
-    hold_slow_rad: Positive = 0.005
+    drift_hold_rad: Positive = 0.005
     """Drift of an arm joint at which the base holds ..."""
-    hold_stop_rad: Positive = 0.01
+    drift_stop_rad: Positive = 0.01
     """... and at which it stops (F20)."""
 
 

@@ -22,6 +22,7 @@ _MOST_DOTS = 200
 """In a key. `tomllib` takes memory by the square of a key's parts, and the text may come out of a log."""
 _BETWEEN_KEYS = re.compile(r"[,={}\[\]\n\r]")
 _HEADER = re.compile(r"\[([^\[\]]+)\]\s*(?:#.*)?\Z")
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _KEY = re.compile(r"([A-Za-z0-9_.\-\"' \t]+)=")
 
 
@@ -97,7 +98,7 @@ def merge(base: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def emit(data: Mapping[str, Any]) -> str:
-    """Write nested tables as TOML; floats keep every bit (shortest text that reads back the same)."""
+    """Write nested tables as TOML, None left out; floats keep every bit (shortest text that reads back the same)."""
     lines: list[str] = []
     _emit_table(data, (), lines)
     return "\n".join(lines) + "\n"
@@ -105,11 +106,19 @@ def emit(data: Mapping[str, Any]) -> str:
 
 def _emit_table(data: Mapping[str, Any], path: KeyPath, lines: list[str]) -> None:
     if path:
-        lines += ["", f"[{'.'.join(path)}]"]
-    lines += [f"{key} = {_emit_value(value)}" for key, value in data.items() if not isinstance(value, Mapping)]
+        lines += ["", f"[{'.'.join(map(_emit_key, path))}]"]
+    lines += [
+        f"{_emit_key(key)} = {_emit_value(value)}"
+        for key, value in data.items()
+        if value is not None and not isinstance(value, Mapping)
+    ]
     for key, value in data.items():
         if isinstance(value, Mapping):
             _emit_table(value, (*path, key), lines)
+
+
+def _emit_key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else _emit_value(key)
 
 
 def _emit_value(value: Any) -> str:

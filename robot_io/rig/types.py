@@ -7,11 +7,12 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from robot_io.messages import Vector3
+
 Positive = Annotated[float, Meta(gt=0)]
 NonNegative = Annotated[float, Meta(ge=0)]
 Level = Literal["sim", "emulated", "hardware"]
 Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
 _OnRobot = Annotated[float, Meta(ge=-5, le=5)]
 InBase = tuple[_OnRobot, _OnRobot, _OnRobot]
 """A point of the robot in m: beyond 5 m it was written in mm."""
@@ -22,7 +23,11 @@ _Turn = Annotated[float, Meta(ge=-6.3, le=6.3)]
 Joints = tuple[_Turn, _Turn, _Turn, _Turn, _Turn, _Turn]
 """Joints of a UR10 in rad, a full turn to either side: beyond it they were written in degrees."""
 Matrix3 = tuple[Vector3, Vector3, Vector3]
-Vector6 = tuple[float, float, float, float, float, float]
+
+
+_Plain = bool | int | float | str
+Options = dict[str, _Plain | list[_Plain]]
+"""Keys of a device's kind, whose meaning only its driver knows."""
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

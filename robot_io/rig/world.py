@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from robot_io.rig.types import NonNegative, Positive, Table, Vector2, Vector3, Vector6
+from robot_io.messages import Vector3, Vector6
+from robot_io.rig.types import NonNegative, Positive, Table, Vector2
 
 
 class SliderConfig(Table, frozen=True):

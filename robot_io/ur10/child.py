@@ -8,7 +8,6 @@ lost it says so in the record, reports it, and ends.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
 import signal
@@ -20,7 +19,6 @@ import msgspec
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable, PushError
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES, pack_arm_record
 from robot_io.ipc.process import (
     die_with_parent,
     forbid_new_descriptors,
@@ -29,9 +27,10 @@ from robot_io.ipc.process import (
     starting_threads_at,
     try_realtime,
 )
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
+from robot_io.ipc.status import StatusPipe
 from robot_io.messages import ArmError, ArmRecord, LinkState
-from robot_io.ur10.job import ArmJob, error_line, ready_line
+from robot_io.ur10.job import ArmJob
 from robot_io.ur10.preflight import preflight
 from robot_io.ur10.reader import POLL_NS, ArmReader
 from robot_io.ur10.servo import ActiveHold
@@ -70,7 +69,7 @@ class ArmProcess:
     """The loop: look for a packet, publish, and in servo mode command the target."""
 
     def __init__(
-        self, job: ArmJob, record: SharedRecord, reader: ArmReader, hold: ActiveHold | None, ending: Ending
+        self, job: ArmJob, record: TypedRecord[ArmRecord], reader: ArmReader, hold: ActiveHold | None, ending: Ending
     ) -> None:
         self._job = job
         self._record = record
@@ -115,10 +114,8 @@ class ArmProcess:
         assert reader.joints is not None, "the loop starts after the first packets"
         self._published_ns = now_ns
         servo = self._hold is not None and link == LinkState.UP and error == ArmError.NONE
-        record = ArmRecord(
-            reader.joints, reader.joint_modes, reader.packets, now_ns, reader.changed_ns, link, error, servo, self._pid
-        )
-        self._record.publish(pack_arm_record(record))
+        record = ArmRecord(reader.joints, reader.packets, now_ns, reader.changed_ns, link, error, servo, self._pid)
+        self._record.publish(record)
 
 
 def _sleep_until_next(deadline_ns: int) -> int:
@@ -131,7 +128,7 @@ def _sleep_until_next(deadline_ns: int) -> int:
     return deadline_ns
 
 
-def hold_arm(job: ArmJob, record: SharedRecord) -> NoReturn:
+def hold_arm(job: ArmJob, record: TypedRecord[ArmRecord], status: StatusPipe) -> NoReturn:
     """Connect, report ready, publish until told to end; then end this process. Raises DeviceError."""
     info = preflight(job.host)
     threads_priority = RECEIVER_PRIORITY if job.realtime_priority > 0 else 0
@@ -151,7 +148,7 @@ def hold_arm(job: ArmJob, record: SharedRecord) -> NoReturn:
     if hold is not None:
         hold.begin()  # from here on its watchdog waits 0.1 s at most: the slow preparations are done
     process = ArmProcess(job, record, reader, hold, ending)  # publishes the first record
-    _report(job, ready_line(info, realtime))
+    status.say("ready", info=msgspec.to_builtins(info), realtime=realtime)
     process.run()
     _leave(0)
 
@@ -161,26 +158,21 @@ def _leave(code: int) -> NoReturn:
     os._exit(code)  # the kernel closes everything
 
 
-def _report(job: ArmJob, line: bytes) -> None:
-    if job.status_fd is not None:
-        with contextlib.suppress(OSError):  # nobody listens any more; the record tells the rest
-            os.write(job.status_fd, line)
-
-
 def main() -> NoReturn:
     """Run the job on stdin. Exit code 0 after SIGTERM, 4 for a device error, 1 otherwise."""
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=ArmJob)
     die_with_parent(job.parent_pid)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the launcher's to handle
     set_timer_slack_1ns()
+    status = StatusPipe(job.status_fd)
     try:
-        hold_arm(job, SharedRecord(job.record_fd, ARM_RECORD_BYTES))
+        hold_arm(job, TypedRecord(job.record_fd, ARM_RECORD), status)
     except PushError as error:
-        _report(job, error_line(error))
+        status.error(error)
         # In here: after this block the error lets go of the frames that hold the wheel's objects.
         _leave(error.exit_code)
     except Exception as error:  # the last line of a process: whatever it was, the parent hears of it
-        _report(job, error_line(DeviceError(f"the arm's process failed: {error!r}", where=job.host)))
+        status.error(DeviceError(f"the arm's process failed: {error!r}", where=job.host))
         _leave(1)
 
 

@@ -11,21 +11,17 @@ process all look the same from here: the record grows old.
 
 from __future__ import annotations
 
-import contextlib
 import os
-import select
-import signal
-import subprocess
-from typing import IO
+from collections.abc import Mapping
+from typing import Any, Self
 
 import msgspec
 
-from robot_io.clock import NS_PER_S, monotonic_ns
-from robot_io.driver import DriverBase
+from robot_io.clock import NS_PER_S
+from robot_io.driver import DriverBase, no_more_options
 from robot_io.errors import DeviceError, DeviceUnreachable
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES, unpack_arm_record
-from robot_io.ipc.process import fresh_interpreter
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
+from robot_io.ipc.spawn import Child, spawn
 from robot_io.messages import (
     NO_ARM,
     ArmError,
@@ -37,64 +33,23 @@ from robot_io.messages import (
     LinkState,
     Stamped,
 )
-from robot_io.ur10.job import ArmJob, Hold, parse_status
+from robot_io.ur10.job import ArmJob, Hold
 
 START_WITHIN_S: dict[Hold, float] = {"monitor": 5.0, "servo": 8.0}
 """From spawn to ready. The wheel itself waits 5 s for its control script before it says why."""
 STOP_WITHIN_S = 3.0
 
 
-def spawn_child(
-    host: str,
-    *,
-    hold: Hold,
-    record_fd: int,
-    status_fd: int | None = None,
-    held_pose_rad: Joints | None = None,
-    held_pose_tolerance_rad: float = 0.05,
-    stderr: int | IO[bytes] = subprocess.DEVNULL,
-) -> subprocess.Popen[bytes]:
-    """Start the arm's process for the robot at `host`; it publishes into `record_fd` (a `SharedRecord`).
-
-    Angles in rad. It reports on `status_fd` (the write end of a pipe; close yours after this call) with lines
-    for `job.parse_status`, dies with the calling thread (prctl(2) PR_SET_PDEATHSIG), and ends on SIGTERM.
-    `stderr` takes the wheel's own messages. Nothing here waits: enforce a deadline for the first status line.
-    """
-    job = ArmJob(host, hold, record_fd, os.getpid(), held_pose_rad, held_pose_tolerance_rad, status_fd)
-    command, environment = fresh_interpreter("robot_io.ur10.child")
-    child = subprocess.Popen(
-        command,
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=stderr,
-        pass_fds=[fd for fd in (record_fd, status_fd) if fd is not None],
-        start_new_session=True,  # Ctrl-Z and a closed terminal are for the caller, not for its whole group
-    )
-    assert child.stdin is not None, "stdin is a pipe"
-    with contextlib.suppress(BrokenPipeError):  # it died at once: its status or its exit tells
-        child.stdin.write(msgspec.json.encode(job))
-        child.stdin.close()
-    return child
-
-
-def end_child(child: subprocess.Popen[bytes], within_s: float = STOP_WITHIN_S) -> int:
-    """Ask the process to end (SIGTERM), kill it when it has not within `within_s`; return its exit code."""
-    if child.poll() is None:
-        child.terminate()
-        child.send_signal(signal.SIGCONT)  # a stopped process acts on SIGTERM only when it continues
-        try:
-            return child.wait(within_s)
-        except subprocess.TimeoutExpired:
-            child.kill()
-    return child.wait()
+def spawn_arm(job: ArmJob) -> Child:
+    """Start the arm's process; it is ready within START_WITHIN_S, dies with the calling thread, ends on SIGTERM."""
+    return spawn("arm", "robot_io.ur10.child", job, [job.record_fd])
 
 
 class ArmLink:
-    """The newest record of the arm's process, from a descriptor made by `SharedRecord.create`."""
+    """The newest record of the arm's process, from a descriptor made by `TypedRecord.create`."""
 
     def __init__(self, record_fd: int) -> None:
-        self._record = SharedRecord(record_fd, ARM_RECORD_BYTES)
+        self._record = TypedRecord(record_fd, ARM_RECORD)
         self._count = 0
         self._newest: ArmRecord | None = None
 
@@ -103,8 +58,7 @@ class ArmLink:
         if self._record.count != self._count:
             read = self._record.read()
             if read is not None:
-                self._count = read[0]
-                self._newest = unpack_arm_record(read[1])
+                self._count, self._newest = read
         return self._newest
 
     def close(self) -> None:
@@ -132,13 +86,21 @@ class Ur10(DriverBase):
         self._hold: Hold = hold
         self._held_pose_rad = held_pose_rad
         self._tolerance_rad = held_pose_tolerance_rad
-        self._child: subprocess.Popen[bytes] | None = None
+        self._child: Child | None = None
         self._link: ArmLink | None = None
         self._flowing = False
         self._last = NO_ARM
         self._drained = 0
         self._first = NO_ARM
-        self._exit_code: int | None = None
+        self._stopped = False
+
+    @classmethod
+    def from_rig(cls, address: str, options: Mapping[str, Any]) -> Self:
+        """Return the arm at a rig's host; `options` has how it is held and where, and no others."""
+        left = dict(options)
+        shared = {name: left.pop(name) for name in ("hold", "held_pose_rad", "held_pose_tolerance_rad") if name in left}
+        no_more_options("ur", left)
+        return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
         """Start the arm's process and wait until it has published (5 s, servo 8 s). Raises DeviceError.
@@ -147,30 +109,17 @@ class Ur10(DriverBase):
         """
         if self._child is not None:
             raise DeviceError("the arm is already open", where=self.host)
-        record = SharedRecord.create("arm", ARM_RECORD_BYTES)
-        listen_fd, status_fd = os.pipe()
+        record = TypedRecord.create("arm", ARM_RECORD)
+        job = ArmJob(self.host, self._hold, record.fd, os.getpid(), self._held_pose_rad, self._tolerance_rad)
         try:
             self._link = ArmLink(record.fd)
-            self._exit_code = None
+            self._stopped = False
             self._last = self._first = NO_ARM
-            self._child = spawn_child(
-                self.host,
-                hold=self._hold,
-                record_fd=record.fd,
-                status_fd=status_fd,
-                held_pose_rad=self._held_pose_rad,
-                held_pose_tolerance_rad=self._tolerance_rad,
-            )
-            os.close(status_fd)
-            status_fd = -1
-            return self._await_ready(listen_fd)
+            self._child = spawn_arm(job)
+            return self._await_ready(self._child)
         except BaseException:
             self.close()
             raise
-        finally:
-            os.close(listen_fd)
-            if status_fd >= 0:
-                os.close(status_fd)
 
     def start(self) -> None:
         """Let samples through from now on; the arm's process publishes since `open`."""
@@ -198,10 +147,10 @@ class Ur10(DriverBase):
         """Return the link state as the arm's process last said, LOST when that process is gone."""
         record = self.read() or NO_ARM
         state, cause = LinkState(record.link), ""
-        if self._child is None or self._exit_code is not None:
+        if self._child is None or self._stopped:
             state = LinkState.CLOSED
-        elif (code := self._child.poll()) is not None:
-            state, cause = LinkState.LOST, _how_it_ended(code)
+        elif self._child.process.poll() is not None:
+            state, cause = LinkState.LOST, f"the arm's process {self._child.how_it_ended()}"
         if state == LinkState.LOST or record.error != ArmError.NONE:
             cause = ArmError(record.error).name.lower() if record.error else cause
         return DeviceHealth(state, cause, {"packets": record.packets}, self._rate_hz(record))
@@ -209,43 +158,36 @@ class Ur10(DriverBase):
     def stop(self) -> None:
         """End the arm's process (3 s, then it is killed). With `hold="monitor"` nothing is sent to the arm."""
         self._flowing = False
-        if self._child is not None and self._exit_code is None:
-            self._exit_code = end_child(self._child)
+        if self._child is not None and not self._stopped:
+            self._stopped = True
+            self._child.stop(STOP_WITHIN_S)
 
     def close(self) -> None:
         """Stop and release everything; idempotent."""
         self.stop()
-        self._child = None
+        if self._child is not None:
+            self._child.close()
+            self._child = None
         if self._link is not None:
             self._link.close()
             self._link = None
 
-    def _await_ready(self, listen_fd: int) -> DeviceInfo:
-        assert self._child is not None, "spawned just before"
+    def _await_ready(self, child: Child) -> DeviceInfo:
         within_s = START_WITHIN_S[self._hold]
-        deadline_ns = monotonic_ns() + int(within_s * NS_PER_S)
-        line = b""
-        while not line.endswith(b"\n"):
-            left_ms = (deadline_ns - monotonic_ns()) / 1e6
-            poll = select.poll()
-            poll.register(listen_fd, select.POLLIN)
-            if left_ms <= 0 or not poll.poll(left_ms):
-                raise DeviceUnreachable(
-                    f"the arm was not ready within {within_s:g} s", where=self.host, do="Check the robot, try again"
-                )
-            data = os.read(listen_fd, 65536)
-            if not data:
-                ended = _how_it_ended(self._child.wait(STOP_WITHIN_S))
-                raise DeviceUnreachable(f"{ended} before it was ready", where=self.host, do="Try again")
-            line += data
-        return parse_status(line.split(b"\n", 1)[0]).info
+        if child.wait_ready(within_s):
+            assert child.ready is not None, "it is"
+            return msgspec.convert(child.ready["info"], DeviceInfo)
+        if child.errors:
+            raise child.errors.pop(0)  # its traceback holds the child: kept in there, neither would be freed
+        if child.status.open:
+            raise DeviceUnreachable(
+                f"the arm was not ready within {within_s:g} s", where=self.host, do="Check the robot, try again"
+            )
+        child.end(STOP_WITHIN_S)
+        raise DeviceUnreachable(
+            f"the arm's process {child.how_it_ended()} before it was ready", where=self.host, do="Try again"
+        )
 
     def _rate_hz(self, record: ArmRecord) -> float:
         span_ns = record.changed_ns - self._first.changed_ns
         return (record.packets - self._first.packets) * NS_PER_S / span_ns if span_ns > 0 else 0.0
-
-
-def _how_it_ended(code: int) -> str:
-    if code < 0:
-        return f"the arm's process was ended by {signal.Signals(-code).name}"
-    return f"the arm's process ended with code {code}"

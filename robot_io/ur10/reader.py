@@ -14,6 +14,7 @@ from typing import Any
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.errors import DeviceUnreachable
 from robot_io.messages import ArmError, JointState
+from robot_io.ur10.state import UrModes
 
 FREQUENCY_HZ = 125.0
 VARIABLES = [
@@ -23,7 +24,6 @@ VARIABLES = [
     "robot_mode",
     "joint_mode",
     "safety_mode",
-    "speed_scaling",
     "runtime_state",
     "robot_status_bits",
     "safety_status_bits",
@@ -32,8 +32,6 @@ FLOW_PACKETS = 10
 FLOW_WITHIN_NS = 1 * NS_PER_S
 _KEEP_PRIORITY = -1
 """Any non-negative value lets the wheel change the scheduling of the calling thread."""
-
-JointModes = tuple[int, int, int, int, int, int]
 
 
 class ArmReader:
@@ -57,7 +55,9 @@ class ArmReader:
         self.changed_ns = 0
         self.error = ArmError.NONE
         self.joints: JointState | None = None
-        self.joint_modes: JointModes = (0, 0, 0, 0, 0, 0)
+        self.modes = UrModes()
+        self.own_program = False
+        """A program that runs is ours (active holding)."""
 
     def wait_flowing(self) -> JointState:
         """Return the newest state once 10 packets came in a row. Raises DeviceUnreachable after 1 s."""
@@ -81,21 +81,22 @@ class ArmReader:
             if not rtde.isConnected():
                 self.error = ArmError.LINK_LOST
             return False
-        joints, modes = self._snapshot()
-        if joints is None:
+        snapshot = self._snapshot()
+        if snapshot is None:
             return False
+        joints, modes = snapshot
         if self.joints is not None and joints.controller_time_s < self.joints.controller_time_s:
             self.error = ArmError.TIME_WENT_BACK
         elif not all(map(math.isfinite, (*joints.position, *joints.velocity, joints.controller_time_s))):
             self.error = ArmError.NOT_FINITE
         elif self.error == ArmError.NOT_FINITE:
             self.error = ArmError.NONE
-        self.joints, self.joint_modes = joints, modes
+        self.joints, self.modes = joints, modes
         self.packets += 1
         self.changed_ns = now_ns
         return True
 
-    def _snapshot(self) -> tuple[JointState | None, JointModes]:
+    def _snapshot(self) -> tuple[JointState, UrModes] | None:
         rtde = self._rtde
         for _ in range(3):  # a second tear in a row is impossible: packets are 8 ms apart
             stamp_s = rtde.getTimestamp()
@@ -107,12 +108,13 @@ class ArmReader:
                 rtde.getRobotStatus(),
                 rtde.getRuntimeState(),
             )
-            scaling = rtde.getSpeedScaling()
             if _same(rtde.getTimestamp(), stamp_s):
                 break
         if len(q) != 6 or len(qd) != 6 or len(modes) != 6:
-            return None, self.joint_modes
-        return JointState(tuple(q), tuple(qd), *numbers, scaling, stamp_s), tuple(modes)
+            return None
+        found = UrModes(*numbers, tuple(modes))
+        state = found.state(own_program=self.own_program)
+        return JointState(tuple(q), tuple(qd), int(state), found.packed(), stamp_s), found
 
 
 def _same(a_s: float, b_s: float) -> bool:

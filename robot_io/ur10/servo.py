@@ -20,6 +20,7 @@ from robot_io.errors import DeviceNotReady
 from robot_io.messages import ArmError, Joints, JointState
 from robot_io.ur10.preflight import is_program_running
 from robot_io.ur10.reader import ArmReader
+from robot_io.ur10.state import RUNTIME_PLAYING, RUNTIME_STOPPED
 
 WATCHDOG_HZ = 10.0
 """The controller stops the program when this many commands a second do not arrive (URScript rtde_set_watchdog)."""
@@ -34,11 +35,6 @@ COMMAND_WITHIN_S = 0.5
 FIRST_COMMAND_WITHIN_S = 5.0
 """The wheel itself waits up to 4 s for its script to be ready."""
 
-STOPPED = 1
-PLAYING = 2
-ROBOT_RUNNING = 7
-SAFETY_ALLOWS = (1, 2)
-
 
 class ActiveHold:
     """Holds the joints measured at construction (rad). Raises DeviceNotReady when that is not safe to begin.
@@ -48,11 +44,10 @@ class ActiveHold:
     """
 
     def __init__(self, host: str, reader: ArmReader, held_pose_rad: Joints | None, tolerance_rad: float) -> None:
-        start = reader.wait_flowing()
-        _check_may_start(host, start, held_pose_rad, tolerance_rad)
-        self.target: Joints = start.position
+        self.target: Joints = _check_may_start(host, reader, held_pose_rad, tolerance_rad)
         self._tolerance_rad = tolerance_rad
         self._rtde = _control_interface(host)
+        reader.own_program = True
         self._host = host
         self._ended = False
         try:
@@ -108,9 +103,7 @@ class ActiveHold:
             return reader.error
         if now_ns - reader.changed_ns > STALE_NS:
             return ArmError.SERVO_STALE
-        if joints.runtime_state != PLAYING or joints.robot_mode != ROBOT_RUNNING:
-            return ArmError.SERVO_STOPPED
-        if joints.safety_mode not in SAFETY_ALLOWS:
+        if not reader.modes.playing:
             return ArmError.SERVO_STOPPED
         if max_difference(joints.position, self.target) > self._tolerance_rad:
             return ArmError.SERVO_NOT_HOLDING
@@ -131,8 +124,10 @@ def max_difference(a: Joints, b: Joints) -> float:
     return max(abs(x - y) for x, y in zip(a, b, strict=True))
 
 
-def _check_may_start(host: str, start: JointState, held_pose_rad: Joints | None, tolerance_rad: float) -> None:
-    if start.runtime_state != STOPPED or is_program_running(host):
+def _check_may_start(host: str, reader: ArmReader, held_pose_rad: Joints | None, tolerance_rad: float) -> Joints:
+    """Return the joints measured now (rad). Raises DeviceNotReady when holding them must not begin."""
+    start = reader.wait_flowing()
+    if reader.modes.runtime_state != RUNTIME_STOPPED or is_program_running(host):
         raise DeviceNotReady(
             "a program is playing on the controller, and holding actively would end it",
             where=host,
@@ -147,6 +142,7 @@ def _check_may_start(host: str, start: JointState, held_pose_rad: Joints | None,
             where=host,
             do="Move the arm to the held pose of the rig, or correct held_pose_rad",
         )
+    return start.position
 
 
 def _control_interface(host: str) -> Any:
@@ -170,7 +166,7 @@ def _control_interface(host: str) -> Any:
 
 def _wait_playing(host: str, reader: ArmReader) -> None:
     deadline_ns = monotonic_ns() + SCRIPT_START_NS
-    while reader.joints is None or reader.joints.runtime_state != PLAYING:
+    while reader.joints is None or reader.modes.runtime_state != RUNTIME_PLAYING:
         if monotonic_ns() > deadline_ns:
             raise DeviceNotReady("the control script is not playing", where=host, do="Try again")
         time.sleep(0.002)

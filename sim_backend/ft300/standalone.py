@@ -6,8 +6,7 @@ import math
 
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.errors import UsageError
-
-Vector6 = tuple[float, float, float, float, float, float]
+from robot_io.messages import Vector6
 
 ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 LARGEST_FORCE_N = 327.67

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from robot_io.clock import NS_PER_S
+from robot_io.geometry import point_outside, rotated, seen_from_frame, wrap_angle
 from robot_io.messages import BaseStatus, BodyTwist, Pose2D
 
 Message = dict[str, Any]
@@ -38,8 +39,7 @@ class FeedWriter:
     def base_transform(self, topic: str, pose: Pose2D, t_ns: int) -> Message:
         """Motion capture of the base's markers: geometry_msgs/TransformStamped."""
         ahead, left, turn = self._marker
-        x = pose.x + ahead * math.cos(pose.yaw) - left * math.sin(pose.yaw)
-        y = pose.y + ahead * math.sin(pose.yaw) + left * math.cos(pose.yaw)
+        x, y = point_outside(pose.x, pose.y, pose.yaw, ahead, left)
         return self.transform(topic, Pose2D(x, y, pose.yaw + turn), t_ns)
 
     def transform(self, topic: str, pose: Pose2D, t_ns: int) -> Message:
@@ -73,8 +73,7 @@ class FeedWriter:
 
     def joint_states(self, topic: str, pose: Pose2D, twist: BodyTwist, t_ns: int) -> Message:
         """sensor_msgs/JointState with joints x, y, yaw in the WORLD frame, not smoothed as the real one is."""
-        cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
-        velocity = [twist.vx * cosine - twist.vy * sine, twist.vx * sine + twist.vy * cosine, twist.omega]
+        velocity = [*rotated(twist.vx, twist.vy, pose.yaw), twist.omega]
         return {
             "header": self._header(topic, "", t_ns),
             "name": ["x", "y", "yaw"],
@@ -131,9 +130,8 @@ def twist_of(message: Message) -> BodyTwist:
 
 def seen_from(origin: Pose2D, pose: Pose2D) -> Pose2D:
     """Return `pose` in the frame of `origin`: odometry counts from where it started."""
-    dx, dy = pose.x - origin.x, pose.y - origin.y
-    cosine, sine = math.cos(origin.yaw), math.sin(origin.yaw)
-    return Pose2D(cosine * dx + sine * dy, cosine * dy - sine * dx, math.remainder(pose.yaw - origin.yaw, math.tau))
+    x, y = seen_from_frame(pose.x - origin.x, pose.y - origin.y, origin.yaw)
+    return Pose2D(x, y, wrap_angle(pose.yaw - origin.yaw))
 
 
 def _quaternion(yaw: float) -> Message:

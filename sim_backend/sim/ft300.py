@@ -1,7 +1,8 @@
-"""The FT 300 of level `sim`: the driver contract over a virtual clock, without a byte.
+"""The force-torque sensor of level `sim`: the driver contract over a virtual clock, without a byte.
 
-Like the real one it samples on its own grid, counts in 0.01 N and 0.001 N*m, and delivers each sample when its
-last byte would have been read. Not modelled: garbled packets, the adapter's bunching, opening and closing times.
+Like a real one (an FT 300 unless told otherwise) it samples on its own grid, counts in steps, and delivers each
+sample when its last byte would have been read. Not modelled: garbled packets, the adapter's bunching, opening and
+closing times.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ from collections import deque
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs
 from robot_io.driver import DriverBase
 from robot_io.errors import DeviceNotReady
-from robot_io.messages import DeviceHealth, DeviceInfo, LinkState, SensorWrench, Stamped
+from robot_io.messages import DeviceHealth, DeviceInfo, LinkState, SensorWrench, Stamped, Vector6
 from sim_backend.world.plant import FtSource
 
 LINE_NS = 16 * NS_PER_S // 1920
 """16 bytes at 1920 bytes a second."""
-COUNT_LIMITS = (-32768, 32767)
+FT300_RESOLUTION: Vector6 = (0.01, 0.01, 0.01, 0.001, 0.001, 0.001)
+FT300_LIMIT: Vector6 = (327.67, 327.67, 327.67, 32.767, 32.767, 32.767)
+"""What an int16 in steps of the resolution can say."""
 MAX_IN_FLIGHT = 512
 
 
@@ -27,11 +30,21 @@ class SimFt300(DriverBase):
     """
 
     def __init__(
-        self, source: FtSource, clock: ClockNs, *, rate_hz: float = 100.016, phase: float = 0.37, latency_ms: int = 1
+        self,
+        source: FtSource,
+        clock: ClockNs,
+        *,
+        rate_hz: float = 100.016,
+        phase: float = 0.37,
+        latency_ms: int = 1,
+        resolution: Vector6 = FT300_RESOLUTION,
+        limit: Vector6 = FT300_LIMIT,
     ) -> None:
         self._source = source
         self._clock = clock
         self._rate_hz = rate_hz
+        self._steps_per_unit = tuple(1.0 / step for step in resolution)
+        self._limit = limit
         self._phase = phase
         self._age_ns = LINE_NS + latency_ms * NS_PER_MS
         self._state = LinkState.CLOSED
@@ -63,7 +76,7 @@ class SimFt300(DriverBase):
         """Return the samples that have arrived by now, oldest first: N, N*m in the SENSOR frame."""
         now_ns = self._clock()
         while self._streaming and (sample_ns := self._sample_ns()) <= now_ns:
-            wrench = quantised(self._source.read_ft(sample_ns))
+            wrench = self._quantised(self._source.read_ft(sample_ns))
             self._in_flight.append(Stamped(wrench, self._next_seq, sample_ns + self._age_ns))
             self._index += 1
             self._next_seq += 1
@@ -95,20 +108,11 @@ class SimFt300(DriverBase):
     def _sample_ns(self) -> int:
         return round((self._index + self._phase) * NS_PER_S / self._rate_hz)
 
-
-def quantised(wrench: tuple[float, float, float, float, float, float]) -> SensorWrench:
-    """Return the wrench as an int16 in 0.01 N and 0.001 N*m can say it, clipped at its ends."""
-    fx, fy, fz, mx, my, mz = wrench
-    return SensorWrench(
-        _rounded(fx, 100),
-        _rounded(fy, 100),
-        _rounded(fz, 100),
-        _rounded(mx, 1000),
-        _rounded(my, 1000),
-        _rounded(mz, 1000),
-    )
+    def _quantised(self, wrench: Vector6) -> SensorWrench:
+        """Return the wrench (N, N*m) in whole steps of the resolution, clipped at the limit of each axis."""
+        fx, fy, fz, mx, my, mz = map(_rounded, wrench, self._steps_per_unit, self._limit)
+        return SensorWrench(fx, fy, fz, mx, my, mz)
 
 
-def _rounded(value: float, counts_per_unit: int) -> float:
-    low, high = COUNT_LIMITS
-    return min(max(round(value * counts_per_unit), low), high) / counts_per_unit
+def _rounded(value: float, steps_per_unit: float, limit: float) -> float:
+    return round(min(max(value, -limit), limit) * steps_per_unit) / steps_per_unit

@@ -8,11 +8,9 @@ from __future__ import annotations
 from robot_io.clock import NS_PER_S, ClockNs
 from robot_io.driver import DriverBase
 from robot_io.errors import DeviceNotReady
-from robot_io.messages import NO_ARM, ArmRecord, DeviceHealth, DeviceInfo, JointState, LinkState, Stamped
-from sim_backend.ur10.modes import RobotMode, RuntimeState, SafetyMode, joint_mode, robot_status_bits, safety_bits
+from robot_io.messages import NO_ARM, ArmRecord, ArmState, DeviceHealth, DeviceInfo, JointState, LinkState, Stamped
 from sim_backend.world.plant import ArmSource
 
-_MODE = joint_mode(RobotMode.RUNNING, SafetyMode.NORMAL)
 _CYCLE_S = 0.008
 
 
@@ -77,13 +75,8 @@ class SimUr10(DriverBase):
         joints = JointState(
             truth.position,
             truth.velocity,
-            int(RobotMode.RUNNING),
-            int(SafetyMode.NORMAL),
-            safety_bits(SafetyMode.NORMAL),
-            robot_status_bits(RobotMode.RUNNING, RuntimeState.STOPPED, teach_button=False),
-            int(RuntimeState.STOPPED),
-            1.0,
+            int(ArmState.HOLDING),
+            0,
             packets * _CYCLE_S,
         )
-        modes = (_MODE, _MODE, _MODE, _MODE, _MODE, _MODE)
-        return ArmRecord(joints, modes, packets, at_ns, at_ns, int(LinkState.UP))
+        return ArmRecord(joints, packets, at_ns, at_ns, int(LinkState.UP))

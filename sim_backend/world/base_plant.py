@@ -18,6 +18,7 @@ import math
 from collections import deque
 
 from robot_io.clock import NS_PER_MS, NS_PER_S
+from robot_io.geometry import wrap_angle
 from robot_io.messages import BodyTwist, Pose2D
 
 GRID_NS = NS_PER_MS
@@ -70,7 +71,7 @@ class BasePlant:
     @property
     def pose(self) -> Pose2D:
         """Pose in the WORLD frame."""
-        return Pose2D(self._x, self._y, _wrapped(self._yaw))
+        return Pose2D(self._x, self._y, wrap_angle(self._yaw))
 
     @property
     def place(self) -> tuple[float, float, float]:
@@ -159,9 +160,3 @@ def _approach(target: float, before: float, limit: float, step: float) -> float:
     if -step <= change <= step:
         return wanted  # not before + change, which would miss the target by a rounding
     return before + clamp(change, -step, step)
-
-
-def _wrapped(angle: float) -> float:
-    """Return the angle in (-pi, pi]."""
-    turned = math.remainder(angle, math.tau)
-    return turned if turned > -math.pi else math.pi

@@ -7,6 +7,7 @@ import random
 
 import msgspec
 
+from robot_io.geometry import StraightPath, rotated
 from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
 from robot_io.rig.world import FloorConfig, SliderConfig
@@ -72,16 +73,15 @@ def place(rig: RigConfig, seed: int) -> Scene:
     normal_x, normal_y = math.cos(heading + normal_angle), math.sin(heading + normal_angle)
     contact_x = start.gap_m + world.ball_radius_m * normal_x
     contact_y = lateral + world.ball_radius_m * normal_y
-    cos, sin = math.cos(heading), math.sin(heading)
-    slider_x = contact_x - (cos * contact_body_x - sin * contact_body_y)
-    slider_y = contact_y - (sin * contact_body_x + cos * contact_body_y)
-    yaw = math.radians(rig.path.direction_deg)
-    slider = _to_world(rig, slider_x, slider_y, heading)
-    ball = _to_world(rig, 0.0, lateral, 0.0)
-    reach_x, reach_y, _ = rig.frames.contact_in_base_m
-    base_x = ball.x - (math.cos(yaw) * reach_x - math.sin(yaw) * reach_y)
-    base_y = ball.y - (math.sin(yaw) * reach_x + math.cos(yaw) * reach_y)
-    return Scene(Pose2D(base_x, base_y, yaw), slider)
+    offset_x, offset_y = rotated(contact_body_x, contact_body_y, heading)
+    path = StraightPath.of(rig.path.origin_m, rig.path.direction_deg)
+    slider = path.point_in_world(contact_x - offset_x, contact_y - offset_y)
+    ball_x, ball_y = path.point_in_world(0.0, lateral)
+    reach_x, reach_y = rotated(*rig.frames.contact_in_base_m[:2], path.heading)
+    return Scene(
+        Pose2D(ball_x - reach_x, ball_y - reach_y, path.heading),
+        Pose2D(*slider, math.remainder(path.heading + heading, math.tau)),
+    )
 
 
 def _spread(dice: random.Random, spread: float) -> float:
@@ -94,11 +94,3 @@ def _contact_in_body(slider: SliderConfig, edge_m: float) -> tuple[float, float,
         angle = math.pi - edge_m / slider.radius_m
         return slider.radius_m * math.cos(angle), slider.radius_m * math.sin(angle), angle - math.pi
     return -slider.length_m / 2, edge_m, 0.0
-
-
-def _to_world(rig: RigConfig, x_path: float, y_path: float, heading_path: float) -> Pose2D:
-    angle = math.radians(rig.path.direction_deg)
-    cos, sin = math.cos(angle), math.sin(angle)
-    origin_x, origin_y = rig.path.origin_m
-    yaw = math.remainder(angle + heading_path, math.tau)
-    return Pose2D(origin_x + cos * x_path - sin * y_path, origin_y + sin * x_path + cos * y_path, yaw)

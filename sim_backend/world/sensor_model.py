@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import random
 
+from robot_io.messages import Vector3
 from robot_io.rig.config import RigConfig
-from robot_io.rig.types import Vector3
 
 GRAVITY_M_PER_S2 = 9.81
 

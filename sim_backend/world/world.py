@@ -7,9 +7,9 @@ so that the world can be run again bit for bit.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
+from robot_io.geometry import point_outside, seen_from_frame
 from robot_io.log.world_messages import WorldCommand, WorldStall, WorldStart, WorldState
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.rig.config import RigConfig
@@ -54,7 +54,7 @@ class World:
         self._sensor = SensorModel(rig, seed)
         self._arm = ArmTruth(rig.arm.held_pose_rad, (0.0,) * 6)
         self._reach = rig.frames.contact_in_base_m[:2]
-        self._ball = self._ball_of(*self._plant.place)
+        self._ball = point_outside(*self._plant.place, *self._reach)
         self._contact = FREE
         self._start_ns = start_ns
         self._steps = 0
@@ -115,16 +115,11 @@ class World:
     def _step(self) -> None:
         self._steps += 1
         self._plant.step_to(self.now_ns)
-        ball = self._ball_of(*self._plant.place)
+        ball = point_outside(*self._plant.place, *self._reach)
         self._contact = self._slider.step(self._ball, ball, GRID_NS * 1e-9)
         self._ball = ball
         if self._steps % STATE_EVERY_STEPS == 0:
             self._on_record(self._state())
-
-    def _ball_of(self, x: float, y: float, yaw: float) -> tuple[float, float]:
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        reach_x, reach_y = self._reach
-        return x + cos * reach_x - sin * reach_y, y + sin * reach_x + cos * reach_y
 
     def _state(self) -> WorldState:
         contact = self._contact
@@ -142,6 +137,4 @@ class World:
 
 
 def _in_base(pose: Pose2D, x_world: float, y_world: float) -> tuple[float, float]:
-    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    dx, dy = x_world - pose.x, y_world - pose.y
-    return cos * dx + sin * dy, cos * dy - sin * dx
+    return seen_from_frame(x_world - pose.x, y_world - pose.y, pose.yaw)

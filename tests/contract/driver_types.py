@@ -1,10 +1,10 @@
-"""The drivers keep the contract of `robot_io/driver.py` in their types as well: mypy reads this, nobody runs it."""
+"""The drivers keep the protocols of `robot_io/driver.py` in their types as well: mypy reads this, nobody runs it."""
 
 from __future__ import annotations
 
-from robot_io.driver import CommandedDriver, Driver
+from robot_io.driver import Base, Driver, Sensor
 from robot_io.ft300.driver import Ft300
-from robot_io.messages import BaseFeed, BodyTwist, JointState, SensorWrench
+from robot_io.messages import BaseFeed, JointState, SensorWrench
 from robot_io.ridgeback.driver import Ridgeback
 from robot_io.ur10.driver import Ur10
 from sim_backend.sim.ft300 import SimFt300
@@ -12,7 +12,7 @@ from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 
 
-def sensors(real: Ft300, simulated: SimFt300) -> tuple[Driver[SensorWrench], ...]:
+def sensors(real: Ft300, simulated: SimFt300) -> tuple[Sensor, Driver[SensorWrench]]:
     return real, simulated
 
 
@@ -20,5 +20,5 @@ def arms(real: Ur10, simulated: SimUr10) -> tuple[Driver[JointState], ...]:
     return real, simulated
 
 
-def bases(real: Ridgeback, simulated: SimRidgeback) -> tuple[CommandedDriver[BaseFeed, BodyTwist], ...]:
+def bases(real: Ridgeback, simulated: SimRidgeback) -> tuple[Base, Driver[BaseFeed]]:
     return real, simulated

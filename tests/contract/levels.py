@@ -1,5 +1,8 @@
 """What the contract suite needs of a level: drivers, a way to let time pass, and a way to break a link.
 
+PUSH_TEST_KIND=ft=udp_sensor:UdpSensor (or arm=, base=) with PUSH_TEST_KIND_FOLDER tests a kind of one's own instead, on
+its own emulator.
+
 sim: in-process devices on one simulated world and a virtual clock. emulated: the real drivers and a process with a
 wire emulator for each. hardware: the real drivers at the addresses of these environment variables.
 """
@@ -16,6 +19,7 @@ import pytest
 
 from robot_io.clock import VirtualClock
 from robot_io.ft300.driver import Ft300
+from robot_io.kinds import find_kind
 from robot_io.ridgeback.driver import Ridgeback
 from robot_io.rig.config import load_rig
 from robot_io.rig.topics import TopicsConfig
@@ -27,9 +31,12 @@ from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
 from tests.wire.bridge_process import running_bridge
 from tests.wire.ft300_process import ft300_process
+from tests.wire.kind_process import kind_process
 from tests.wire.ur_process import EmulatorProcess
 
-DEVICES = ("ft300", "ur10", "ridgeback")
+OWN_DEVICE, _, OWN_KIND = os.environ.get("PUSH_TEST_KIND", "").partition("=")
+OWN_FOLDER = os.environ.get("PUSH_TEST_KIND_FOLDER", "")
+DEVICES = (OWN_KIND,) if OWN_KIND else ("ft300", "ur10", "ridgeback")
 ADDRESSES = {"ft300": "PUSH_TEST_FT300_PORT", "ur10": "PUSH_TEST_UR10_HOST", "ridgeback": "PUSH_TEST_RIDGEBACK_URL"}
 TOPICS = TopicsConfig(status="")
 """The status comes once a second, and every start would wait for it."""
@@ -98,6 +105,8 @@ class OnTheWire:
             return Ft300(self._address)
         if self.device == "ur10":
             return Ur10(self._address)
+        if self.device == OWN_KIND:
+            return find_kind(OWN_DEVICE, OWN_KIND, OWN_FOLDER).from_rig(self._address, {})
         return Ridgeback(self._address, topics=TOPICS)
 
     def let_pass(self, seconds: float) -> None:
@@ -129,6 +138,9 @@ def emulated(device: str) -> Iterator[OnTheWire]:
         with EmulatorProcess() as robot:
             stop_or_go = lambda frozen: robot.freeze_process() if frozen else robot.thaw_process()  # noqa: E731
             yield OnTheWire(device, robot.host, robot.kill, stop_or_go)
+    elif device == OWN_KIND:
+        with kind_process(OWN_DEVICE, OWN_KIND, OWN_FOLDER) as emulator:
+            yield OnTheWire(device, emulator.address, emulator.process.kill, _stopper(emulator.process.pid))
     else:
         with running_bridge(topics=TOPICS) as bridge:
             yield OnTheWire(device, bridge.url, lambda: bridge.do("kill"), _stopper(bridge.process.pid))

@@ -11,12 +11,14 @@ import pytest
 from robot_io.clock import monotonic_ns
 from robot_io.errors import DeviceError
 from robot_io.messages import BodyTwist, DeviceHealth, DeviceInfo, LinkState, Stamped
-from tests.contract.levels import DEVICES, Simulated, emulated, hardware
+from tests.contract.levels import DEVICES, OWN_DEVICE, OWN_KIND, Simulated, emulated, hardware
 
 STOP_WITHIN_S = 2.0
 HANG_GUARD_S = 3.0
 """A thousand calls of a method that never blocks take a few milliseconds; this only tells it from one that waits."""
 SLOW_S = 0.02
+COMMANDED = ([OWN_KIND] if OWN_DEVICE == "base" else []) if OWN_KIND else ["ridgeback"]
+"""Devices that take commands."""
 BASE_FORWARD = BodyTwist(0.05, -0.02, 0.01)
 
 LEVELS = [
@@ -24,6 +26,8 @@ LEVELS = [
     pytest.param("emulated", id="emulated"),
     pytest.param("hardware", id="hardware", marks=pytest.mark.hardware),
 ]
+if OWN_KIND:
+    LEVELS = LEVELS[1:2]
 
 
 def opened_level(level, device):
@@ -116,7 +120,7 @@ def test_drain_of_a_silent_device_gives_nothing_at_once(level, driver):
         assert time.monotonic() - began_s < HANG_GUARD_S
 
 
-@pytest.mark.parametrize("level", cases(["ridgeback"]), indirect=True)
+@pytest.mark.parametrize("level", cases(COMMANDED), indirect=True)
 def test_the_base_says_what_it_really_sent(level, driver):
     wanted = BodyTwist() if level.name == "hardware" else BASE_FORWARD
     assert driver.command(wanted) == BodyTwist(), "closed: nothing is sent"
@@ -176,7 +180,7 @@ def test_with_closes_after_an_exception(driver):
 
 
 @pytest.mark.parametrize("device", DEVICES)
-@pytest.mark.parametrize("level_name", LEVELS[1:])  # drivers of level sim have no link that could break
+@pytest.mark.parametrize("level_name", [level for level in LEVELS if level.id != "sim"])
 def test_a_lost_link_is_said_and_never_raised(level_name, device):
     with opened_level(level_name, device) as level:
         driver = level.driver()
@@ -195,7 +199,7 @@ def test_a_lost_link_is_said_and_never_raised(level_name, device):
             came_before = driver.drain()
             assert all(sample.received_ns <= noticed_ns for sample in came_before)
             assert driver.drain() == ()
-            if device == "ridgeback":
+            if device in COMMANDED:
                 assert driver.command(BASE_FORWARD) == BodyTwist(), "nothing was sent"
         finally:
             began_s = time.monotonic()

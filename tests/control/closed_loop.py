@@ -12,7 +12,7 @@ from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import ArmRecord, BaseRecord, BaseStatus, BodyTwist, JointState
 from robot_io.tick import FtInput, FtReading, HostInput, Operator, TickInput, TickOutput, TickState
 from safety import gate
-from safety.gate import GateLimits, GateState
+from safety.gate import GateState
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
 from tools.run.tick_core import TickCore
@@ -44,7 +44,7 @@ class ClosedLoop:
         self.tick = 0
         self.operator = Operator.NONE
         self.gate = GateState()
-        self._gate_limits = GateLimits.of(self.core.safety)
+        self._gate_limits = self.core.safety.envelope
         self._ft_period_ns = 1e9 / ft_rate_hz
         self._ft_delay_ns = round(ft_delay_ms * 1e6)
         self._ft_burst_ns = ft_burst_ms * 1_000_000
@@ -96,7 +96,7 @@ class ClosedLoop:
             self._odometry = (truth.twist, now_ns, self._odometry[2] + 1)
             self.gate = gate.on_speed(self._gate_limits, self.gate, truth.twist)
         count = self.tick + 1
-        joints = JointState(self.rig.arm.held_pose_rad, (0.0,) * 6, 7, 1, 1, 1, 1, 1.0, self.tick * 0.01)
+        joints = JointState(self.rig.arm.held_pose_rad, (0.0,) * 6, 1, 0, self.tick * 0.01)
         operator, self.operator = self.operator, Operator.NONE
         return TickInput(
             self.tick,
@@ -104,7 +104,7 @@ class ClosedLoop:
             int(operator),
             HostInput(0, 0, True, True, True, False, 0),
             FtInput(readings, LINK_UP, self._arrived, 0, 0),
-            ArmRecord(joints, (253,) * 6, count, now_ns, now_ns, LINK_UP),
+            ArmRecord(joints, count, now_ns, now_ns, LINK_UP),
             BaseRecord(
                 pose=truth.pose,
                 pose_valid=True,

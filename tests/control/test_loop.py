@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from control.loop import MAX_READINGS, ControlLoop, Watch
+from control.loop import ControlLoop, Watch
 from robot_io.messages import DeviceHealth, LinkState, SensorWrench, Stamped
 from robot_io.tick import Operator, TickState
 
@@ -36,6 +36,7 @@ def bench():
         lambda state, inp: (state, None),
         TickState(),
         rate_hz=100.0,
+        sensor_rate_hz=100.0,
         sensor=sensor,
         arm=SimpleNamespace(read=lambda: None),
         base=SimpleNamespace(alive=True, read=lambda: None),
@@ -85,5 +86,5 @@ def test_of_a_flood_the_newest_packets_stay(bench):
         bench.sensor.arrived = [Stamped(wrench, first + i, 0) for i in range(50)]
         bench.loop._collect()
     seqs = [reading.seq for reading in bench.loop._input(0, 0, 0).ft.readings]
-    assert seqs == list(range(150 - MAX_READINGS, 150))
+    assert seqs == list(range(150 - 64, 150))
     assert bench.loop._input(0, 0, 0).ft.readings == ()

@@ -22,7 +22,7 @@ def test_tare_finds_the_bias_with_the_tool_in_it_then_approaches():
 
 @pytest.mark.parametrize(("seconds", "readings"), [(0.2, 20), (1.0, 100), (2.5, 250)])
 def test_the_tare_lasts_as_long_as_the_rig_says(seconds, readings):
-    bench = FoldBench((f"ft.tare_seconds_s={seconds}",)).run_to(Phase.TARE)
+    bench = FoldBench((f"ft.tare_s={seconds}",)).run_to(Phase.TARE)
     assert bench.run_until(lambda b: b.state.control.phase == Phase.APPROACH) == readings - 1
 
 

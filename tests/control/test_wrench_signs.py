@@ -218,7 +218,7 @@ def test_from_the_bytes_of_the_sensor_to_the_force_no_axis_changes_place():
     body = b"\x20\x4e" + struct.pack("<3h", *(round(100 * r) for r in raw[:3]))
     body += struct.pack("<3h", *(round(1000 * r) for r in raw[3:]))
     (counts,) = StreamParser().feed(body + struct.pack("<H", libscrc.modbus(body)))
-    given = ft_input([Stamped(wrench_from_counts(counts), 1, 2)], Ft300("/dev/none").health())
+    given = ft_input([Stamped(wrench_from_counts(counts), 1, 2)], Ft300("/dev/none").health(), 1)
     (reading,) = given.readings
     assert (*reading.force, *reading.torque) == pytest.approx(raw, abs=0.0051)
     assert reading.torque == pytest.approx(raw[3:], abs=0.00051)

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import textwrap
 import time
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -19,10 +18,10 @@ import pytest
 from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import blame_the_host
 from tools.cli import COMMANDS
+from tools.dev.drivers_page import page
 from tools.dev.fault_table import table
 from tools.dev.rig_reference import reference
 from tools.rig import resolve_rig
-from tools.run.run_facts import PROGRAM_VERSION
 from tools.study.grid import load_grid
 
 ROOT = Path(__file__).parents[2]
@@ -36,13 +35,12 @@ def test_rig_reference_is_current():
     )
 
 
+def test_drivers_page_is_current():
+    assert (ROOT / "docs/drivers.md").read_text() == page(), "python -m tools.dev.drivers_page > docs/drivers.md"
+
+
 def test_fault_table_is_current():
     assert table() in (ROOT / "docs/safety.md").read_text(), "paste the output of python -m tools.dev.fault_table"
-
-
-def test_the_version_is_the_same_everywhere():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert project["version"] == PROGRAM_VERSION
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -15,6 +15,8 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from msgspec.structs import replace
 
+from robot_io.log.mcap_read import read_summary
+from robot_io.log.seal import LogSeal
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.cli import main
 
@@ -91,6 +93,27 @@ def rewritten(
                 writer.add_metadata(note.name, values)
         writer.finish()
     return out
+
+
+def resealed(path: Path, out: Path, edit: Edit, **more: Any) -> Path:
+    """Write the log again as a forger who mends the seal as well; `more` as for `rewritten`."""
+    kept: Messages = []
+    channels = read_summary(path).channels
+    schema: Callable[[str], str] = more.get("schema", lambda text: text)
+
+    def keep(messages: Messages) -> Messages:
+        kept.extend(edit(messages))
+        return kept
+
+    def mend(name: str, values: dict[str, str]) -> dict[str, str]:
+        seal = LogSeal()
+        for channel in channels:
+            seal.declare(channel.topic, channel.schema_name, schema(channel.schema_text).encode())
+        for topic, message in kept:
+            seal.note(topic, message.log_time, message.data)
+        return {**values, **seal.facts()} if name == "run_end" else values
+
+    return rewritten(path, out, keep, metadata=mend, **more)
 
 
 def with_data(message: Message, data: bytes) -> Message:

@@ -11,12 +11,11 @@ import pytest
 from msgspec.structs import replace
 
 from robot_io.errors import LogDamaged
-from robot_io.log.mcap_read import LogSummary, read_summary
-from robot_io.log.seal import LogSeal
+from robot_io.log.mcap_read import read_summary
 from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.messages import BodyTwist, LinkState, Pose2D, WorldTwist
 from robot_io.tick import ControlTick, Operator
-from tests.replay.runs import Messages, changed, places, replayed, rewritten, with_data, with_input
+from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten, with_data, with_input
 from tools.cli import main
 from tools.replay import verified_log
 from tools.replay.fold import replay
@@ -129,11 +128,11 @@ def test_no_flipped_byte_of_a_tick_passes(three_ticks, monkeypatch):
     """Each byte of the first, a middle and the last tick, one bit each; the checksums of the file would be right."""
     messages = list(verified_log.read_log(three_ticks))
     summary = verified_log.read_summary(three_ticks)
-    rig = verified_log.rig_from_toml(summary.attachments["config.toml"].decode())
+    rig = verified_log.rig_of_log(summary.attachments["config.toml"].decode(), 2)
     given = messages
     monkeypatch.setattr(verified_log, "read_log", lambda path: iter(given))
     monkeypatch.setattr(verified_log, "read_summary", lambda path: summary)
-    monkeypatch.setattr(verified_log, "rig_from_toml", lambda text: rig)
+    monkeypatch.setattr(verified_log, "rig_of_log", lambda *_: rig)
     assert verdict(three_ticks) == 0
     at = [i for i, message in enumerate(messages) if message.topic == "/control/tick"]
     for place in at:
@@ -253,31 +252,13 @@ def test_a_changed_record_of_the_world_does_not_pass(name, sim_log, tmp_path, ca
     assert replayed(capsys, log)[0] in (DIFFERS, DAMAGED)
 
 
-def resealed(summary: LogSummary, messages: Messages):
-    """Return the metadata editor of a forger who mends the seal as well."""
-    seal = LogSeal()
-    for channel in summary.channels:
-        seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
-    for topic, message in messages:
-        seal.note(topic, message.log_time, message.data)
-    return lambda name, values: {**values, **seal.facts()} if name == "run_end" else values
-
-
 @pytest.mark.parametrize(
     "name",
     ["a state's force", "a command", "a state's endless time", "start", "start at the end of times", "last state"],
 )
 def test_whoever_mends_the_seal_too_is_found_by_the_world_itself(name, sim_log, tmp_path, capsys):
     topic, index, change = WORLD[name]
-    kept: Messages = []
-
-    def edit(messages: Messages) -> Messages:
-        kept.extend(changed(topic, index, change)(messages))
-        return kept
-
-    summary = read_summary(sim_log)
-    out = tmp_path / "run.mcap"
-    log = rewritten(sim_log, out, edit, metadata=lambda name, values: resealed(summary, kept)(name, values))
+    log = resealed(sim_log, tmp_path / "run.mcap", changed(topic, index, change))
     code, told = replayed(capsys, log)
     assert code == DIFFERS
     assert told["first_difference"] is None

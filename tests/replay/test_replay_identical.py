@@ -10,6 +10,11 @@ from mcap.reader import make_reader
 from tests.replay.runs import replayed, rewritten
 from tools.cli import main
 
+DERIVED = (
+    "/ft/wrench_raw", "/ft/wrench", "/arm/joint_states", "/base/cmd_vel_raw", "/base/cmd_vel", "/loop/timing",
+    "/diagnostics", "/tf", "/tf_static", "/robot_description", "/path", "/safety/event", "/rosout",
+)  # fmt: skip
+
 
 @pytest.mark.parametrize("level", ["sim_run", "emulated_run"])
 def test_every_tick_and_every_state_of_the_world_is_identical(level, request, capsys):
@@ -25,7 +30,18 @@ def test_every_tick_and_every_state_of_the_world_is_identical(level, request, ca
         "gaps": 0,
         "first_difference": None,
         "world": {"states": told["world"]["states"], "identical": told["world"]["states"], "first_difference": None},
+        "derived": {
+            "messages": told["derived"]["messages"],
+            "identical": told["derived"]["messages"],
+            "first_difference": None,
+        },
+        "arrived": {
+            "messages": told["arrived"]["messages"],
+            "identical": told["arrived"]["messages"],
+            "first_difference": None,
+        },
         "complete": True,
+        "made_by": told["made_by"] | {"format": 2},
         "notes": [],
         "machine_differences": [],
     }
@@ -34,6 +50,8 @@ def test_every_tick_and_every_state_of_the_world_is_identical(level, request, ca
     topics = {counts.channels[n].topic: count for n, count in counts.statistics.channel_message_counts.items()}
     assert told["ticks"] == topics["/control/tick"]
     assert told["world"]["states"] == topics["/world/state"]
+    assert told["arrived"]["messages"] > 300
+    assert told["derived"]["messages"] == sum(topics.get(topic, 0) for topic in DERIVED)
 
 
 def test_people_read_one_line_for_the_ticks(sim_log, capsys):

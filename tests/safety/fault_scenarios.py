@@ -181,12 +181,6 @@ CREEPS = base(odometry=BodyTwist(0.015, 0.0, 0.0))
 """Above what counts as rest, below what counts as moving (F34) or as ignoring the command (F33)."""
 NAN = math.nan
 SERVO = ('arm.hold="servo"',)
-BUSY = {
-    "robot mode": joints(robot_mode=3),
-    "power off": joints(robot_status_bits=0),
-    "teach button": joints(robot_status_bits=0b101),
-    "one joint off": arm(joint_modes=(253, 253, 239, 253, 253, 253)),
-}
 SCENARIOS = [
     # --- start
     Scenario("R01", "no arm", arm(packets=3), FoldBench, warm=500),
@@ -227,19 +221,17 @@ SCENARIOS = [
     Scenario("F20-stop", "drift", moved_joint(-0.0101)),
     Scenario("F20-stop", "no longer held actively", arm(servo=False), lambda: pushing(SERVO)),
     Scenario("F21", "joint moves", joints(velocity=(0.0, 0.0, 0.0, -0.021, 0.0, 0.0))),
-    *(Scenario("F22", f"safety bit {bit}", joints(safety_bits=1 | 1 << bit)) for bit in (2, 3, 4, 8, 9, 10)),
-    Scenario("F22", "neither normal nor reduced", joints(safety_bits=0)),
-    *(Scenario("F23", f"safety bit {bit}", joints(safety_bits=1 | 1 << bit)) for bit in (5, 6, 7)),
-    *(Scenario("F22", f"safety mode {mode}", joints(safety_mode=mode)) for mode in (0, 3, 4, 5, 8, 9, 53)),
-    *(Scenario("F23", f"safety mode {mode}", joints(safety_mode=mode)) for mode in (6, 7)),
+    Scenario("F22", "protective stop", joints(state=3)),
+    Scenario("F23", "emergency stop", joints(state=4)),
     Scenario("F24-hold", "no record", old("arm", "published_ns", "changed_ns")),
     Scenario("F24-stop", "no record", old("arm", "published_ns", "changed_ns")),
     Scenario("F24-stop", "link lost", arm(link=3)),
     Scenario("F25-hold", "frozen", old("arm", "changed_ns")),
     Scenario("F25-stop", "frozen", old("arm", "changed_ns")),
-    *(Scenario("F27", what, alter) for what, alter in BUSY.items()),
-    Scenario("F28", "a program plays", joints(runtime_state=2)),
-    Scenario("F28", "a program pauses", joints(runtime_state=4)),
+    Scenario("F27", "state unknown", joints(state=0)),
+    Scenario("F27", "moved by hand", joints(state=2)),
+    Scenario("F27", "switched off", joints(state=5)),
+    Scenario("F28", "a program runs", joints(state=6)),
     Scenario("F29", "NaN position", joints(position=(0.0, NAN, 0.0, 0.0, 0.0, 0.0))),
     Scenario("F29", "infinite velocity", joints(velocity=(0.0, 0.0, 0.0, 0.0, 0.0, math.inf))),
     Scenario("F69", "process gone", host(arm_alive=False)),

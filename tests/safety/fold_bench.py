@@ -50,17 +50,15 @@ class FoldBench:
     def good_input(self) -> TickInput:
         """Return what the core sees when all is well."""
         count = self.tick + 1
-        servo = self.rig.arm.hold == "servo"  # then our own program plays on the arm
-        joints = JointState(
-            self.rig.arm.held_pose_rad, (0.0,) * 6, 7, 1, 1, 1, 2 if servo else 1, 1.0, self.tick * 0.01
-        )
+        servo = self.rig.arm.hold == "servo"
+        joints = JointState(self.rig.arm.held_pose_rad, (0.0,) * 6, 1, 0, self.tick * 0.01)
         return TickInput(
             self.tick,
             self.now_ns,
             0,
             HostInput(0, 0, True, True, True, False, 0),
             FtInput((self._reading(),), LINK_UP, count, 0, 0),
-            ArmRecord(joints, (253,) * 6, count, self.now_ns, self.now_ns, LINK_UP, 0, servo),
+            ArmRecord(joints, count, self.now_ns, self.now_ns, LINK_UP, 0, servo),
             BaseRecord(
                 pose=self.pose,
                 pose_valid=True,

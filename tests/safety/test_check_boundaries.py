@@ -126,6 +126,8 @@ def test_one_changed_number_is_not_frozen():
 
 
 def arm(state=None, settings=SETTINGS, **changes):
+    if "state_" in changes:
+        changes["state"] = changes.pop("state_")
     return arm_checks.check(settings, state or SafetyState(), with_arm(**changes), TARED)[1]
 
 
@@ -173,18 +175,19 @@ def test_age_of_the_arm(key, rows):
         assert arm(**{key: NOW - age_ns}) == found
 
 
-def test_modes_of_the_arm():
-    assert arm(safety_bits=0b10, safety_mode=2) == []  # reduced is fine
-    for mode in range(-1, 11):
-        assert arm(safety_mode=mode) == ([] if mode in (1, 2) else ["F23"] if mode in (6, 7) else ["F22"])
-    assert arm(robot_status_bits=0b11) == []  # power on, program running bit
-    for mode in range(-1, 9):
-        assert arm(robot_mode=mode) == ([] if mode == 7 else ["F27"])
-    for axis in range(6):
-        assert arm(joint_modes=tuple(252 if i == axis else 253 for i in range(6))) == ["F27"]
+@pytest.mark.parametrize(
+    ("state", "found"),
+    [(0, ["F27"]), (1, []), (2, ["F27"]), (3, ["F22"]), (4, ["F23"]), (5, ["F27"]), (6, ["F28"]), (7, ["F27"])],
+)
+def test_states_of_the_arm(state, found):
+    assert arm(state_=state) == found
+    assert arm(settings=replace(SETTINGS, servo=True), state_=state, servo=True) == found
+
+
+def test_an_arm_that_should_be_held_actively_and_is_not():
     servo = replace(SETTINGS, servo=True)
-    assert arm(settings=servo, runtime_state=2, servo=True) == []
-    assert arm(settings=servo, runtime_state=2, servo=False) == ["F20-stop"]
+    assert arm(settings=servo, servo=True) == []
+    assert arm(settings=servo, servo=False) == ["F20-stop"]
 
 
 # --- base --------------------------------------------------------------------------------------------------------

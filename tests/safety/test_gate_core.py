@@ -10,11 +10,11 @@ from msgspec.structs import replace
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
 from safety import gate
+from safety.envelope import EnvelopeLimits
 from safety.faults import FAULTS
 from safety.gate import (
     LATCH_FAULT,
     LATCH_TEXT,
-    GateLimits,
     GateState,
     Latch,
     due,
@@ -27,7 +27,7 @@ from safety.gate import (
 
 MS = 1_000_000
 T0 = 1_000 * MS
-LIMITS = GateLimits(0.15, 0.25, 1.0, 0.5, 10 * MS)
+LIMITS = EnvelopeLimits(0.15, 0.25, 1.0, 0.5, 10 * MS)
 ZERO = BodyTwist()
 ROLLING = GateState(seq=7, tick=40, frame_ns=T0, twist=BodyTwist(0.1, 0.0, 0.0))
 """A gate in the middle of a push."""
@@ -134,7 +134,7 @@ def test_a_step_of_the_turn_rate(sign):
 
 def test_every_limit_itself_still_passes_and_the_next_number_does_not():
     """To the last bit, from rest (where the sums are exact), with an acceleration that is not 1."""
-    limits = GateLimits(0.15, 0.25, 2.0, 0.5, 10 * MS)
+    limits = EnvelopeLimits(0.15, 0.25, 2.0, 0.5, 10 * MS)
     for key, most, latch in (
         ("vx", 1.2 * 2.0 * (10 * MS * 1e-9), Latch.STEP),
         ("vy", 1.2 * 2.0 * (10 * MS * 1e-9), Latch.STEP),

@@ -1,24 +1,25 @@
-"""The gate's process around its judgement, one handler at a time, with a base that only writes down what it is told."""
+"""The gate's process around its shell, one handler at a time, with a base that only writes down what it is told."""
 
 import os
 import socket
-import time
 from collections.abc import Iterator
 
 import pytest
 
-from robot_io.ipc.base_record import BASE_RECORD_BYTES, unpack_base_record
+from robot_io.clock import VirtualClock
 from robot_io.ipc.gate_frame import GateFrame, pack_frame
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import BASE_RECORD, TypedRecord
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.log.channels import Kind
 from robot_io.messages import BaseFeed, BaseOdometry, BaseRecord, BodyTwist, DeviceHealth, LinkState, Stamped
 from robot_io.rig.config import BaseConfig, FramesConfig
-from safety.gate import OWN_PAUSE_NS, GateLimits, Latch
-from safety.gate_process import LAST_ZEROS_NS, GateJob, GateProcess
+from safety import gate_process
+from safety.envelope import EnvelopeLimits
+from safety.gate import Latch
+from safety.gate_process import GateJob, GateProcess
 
-LIMITS = GateLimits(0.15, 0.25, 0.5, 1.0, 10_000_000)
+LIMITS = EnvelopeLimits(0.15, 0.25, 0.5, 1.0, 10_000_000)
 FRAMES = FramesConfig(((1, 0, 0), (0, 1, 0), (0, 0, 1)), (0, 0, 0), (0, 0, 0))
 SLOW, ZERO = BodyTwist(0.005, 0.0, 0.0), BodyTwist()
 MS = 1_000_000
@@ -27,7 +28,8 @@ MS = 1_000_000
 class Base:
     """Stands in for the driver."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
         self.told: list[BodyTwist] = []
         self.arrived: list[Stamped[BaseFeed]] = []
         self.link = LinkState.UP
@@ -41,7 +43,7 @@ class Base:
         if self.link != LinkState.UP:
             return ZERO
         self.told.append(wanted)
-        self.sent_ns = time.monotonic_ns()
+        self.sent_ns = self._clock()
         return wanted
 
     def health(self) -> DeviceHealth:
@@ -49,37 +51,50 @@ class Base:
 
 
 class Rig:
-    """A gate whose handlers are called by the test; `control` is the other end of its socket."""
+    """A gate whose handlers are called by the test at times of its own; `control` is the other end of its socket."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: VirtualClock) -> None:
+        self.clock = clock
         self.control, gate_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self.record_out = SharedRecord.create("record", BASE_RECORD_BYTES)
+        self.record_out = TypedRecord.create("record", BASE_RECORD)
         self.ring = Ring.create("gate", 1 << 16)
-        self.base = Base()
+        self.base = Base(self.clock)
         self.status, status = os.pipe()
         job = GateJob(
-            BaseConfig(), FRAMES, LIMITS, gate_end.detach(), self.record_out.fd, self.ring.fd, status, wall_offset_ns=0
+            BaseConfig(),
+            FRAMES,
+            "",
+            LIMITS,
+            gate_end.detach(),
+            self.record_out.fd,
+            self.ring.fd,
+            status,
+            wall_offset_ns=0,
         )
         self.gate = GateProcess(job, self.base, StatusPipe(status))  # type: ignore[arg-type]
-        self.gate._ran_ns = time.monotonic_ns()
         self.seq = 0
 
     def frame(self, twist: BodyTwist) -> None:
         self.seq += 1
-        self.control.send(pack_frame(GateFrame(self.seq, self.seq, time.monotonic_ns(), 2, twist)))
+        self.control.send(pack_frame(GateFrame(self.seq, self.seq, self.clock(), 2, twist)))
+
+    def wait_ms(self, time_ms: int) -> None:
+        self.clock.advance_to(self.clock() + time_ms * MS)
 
     def record(self) -> BaseRecord:
         found = self.record_out.read()
         assert found is not None
-        return unpack_base_record(found[1])
+        return found[1]
 
     def logged(self, kind: Kind) -> int:
         return sum(record.kind == kind for record in self.ring.pop_all())
 
 
 @pytest.fixture
-def rig() -> Iterator[Rig]:
-    rig = Rig()
+def rig(monkeypatch) -> Iterator[Rig]:
+    clock = VirtualClock(1_000 * MS)
+    monkeypatch.setattr(gate_process, "monotonic_ns", clock)
+    rig = Rig(clock)
     yield rig
     rig.gate._loop.close()
     rig.gate._control.close()
@@ -95,12 +110,29 @@ def test_a_gate_that_was_frozen_lets_nothing_out_whatever_wakes_it_first(rig, wa
     rig.frame(SLOW)
     rig.gate._on_control(0)
     assert rig.base.told == [SLOW]
-    rig.gate._ran_ns -= OWN_PAUSE_NS + MS
+    rig.wait_ms(101)
     for _ in range(3):
         rig.frame(SLOW)
     getattr(rig.gate, wake)(0)
     assert rig.base.told[1:] == [ZERO]
     assert rig.record().latch_cause == Latch.PAUSED
+
+
+def test_a_pause_while_frames_are_read_is_no_silence_of_control(rig, monkeypatch):
+    """It falls between the look at the clock and the first frame, and seven frames come meanwhile."""
+    rig.frame(SLOW)
+    rig.gate._on_control(0)
+    began_ns = rig.clock()
+    for n in range(7):
+        sent_ns = began_ns + (n + 1) * 10 * MS
+        rig.control.send(pack_frame(GateFrame(2 + n, 2 + n, sent_ns, 2, SLOW)))
+    looks = iter([began_ns])
+    monkeypatch.setattr(gate_process, "monotonic_ns", lambda: next(looks, began_ns + 70 * MS))
+    rig.gate._on_control(0)
+    monkeypatch.setattr(gate_process, "monotonic_ns", lambda: began_ns + 72 * MS)
+    rig.gate._on_clock(0)
+    record = rig.record()
+    assert (record.latched, record.accepted_seq) == (False, 8)
 
 
 def test_over_a_lost_link_nothing_counts_as_sent(rig):
@@ -132,11 +164,14 @@ def test_the_last_zeros_go_on_until_the_base_rests(rig, measured, ends):
     rig.gate._on_control(0)
     stopped: list[bool] = []
     rig.gate._loop.stop = lambda: stopped.append(True)
-    since_ns = rig.gate._end_ns - LAST_ZEROS_NS
-    rig.base.arrived.append(Stamped(BaseOdometry(measured), 0, since_ns + 130 * MS, 0.0))
+    rig.wait_ms(130)
+    rig.base.arrived.append(Stamped(BaseOdometry(measured), 0, rig.clock(), 0.0))
     rig.gate._on_clock(0)
     assert bool(stopped) == ends
-    rig.gate._end_ns = time.monotonic_ns()  # half a second is over
+    rig.wait_ms(369)
+    rig.gate._on_clock(0)
+    assert bool(stopped) == ends
+    rig.wait_ms(1)  # half a second is over
     rig.gate._on_clock(0)
     assert stopped
     assert set(rig.base.told[1:]) == {ZERO}

@@ -26,8 +26,8 @@ WRITTEN_DOWN = {
     "limits.max_acceleration_m_per_s2": 2.5,
     "limits.max_yaw_acceleration_rad_per_s2": 1.0,
     "limits.max_heading_error_deg": 20.0,
-    "limits.hold_slow_rad": 0.01,
-    "limits.hold_stop_rad": 0.02,
+    "limits.drift_hold_rad": 0.01,
+    "limits.drift_stop_rad": 0.02,
 }
 
 
@@ -41,8 +41,8 @@ def test_the_ceilings_are_those():
 def test_each_ceiling(key):
     value = WRITTEN_DOWN[key]
     rig = with_value(key, value)
-    if key == "limits.hold_slow_rad":  # must also stay below hold_stop_rad
-        rig = replace(rig, limits=replace(rig.limits, hold_stop_rad=0.02))
+    if key == "limits.drift_hold_rad":  # must also stay below drift_stop_rad
+        rig = replace(rig, limits=replace(rig.limits, drift_stop_rad=0.02))
     check(rig)
     for bad in (math.nextafter(value, math.inf), value * 1.01, math.inf, math.nan):
         with pytest.raises(ConfigError) as error:
@@ -61,7 +61,7 @@ def changed(**values):
     ("upper", "low"),
     [
         ({"max_force_N": 80.0}, "slow_force_N"),
-        ({"hold_stop_rad": 0.008}, "hold_slow_rad"),
+        ({"drift_stop_rad": 0.008}, "drift_hold_rad"),
         ({"slow_force_N": 30.0}, "force_min_N"),
     ],
 )
@@ -99,7 +99,7 @@ def test_the_settings_are_in_si_units():
     assert settings.max_heading_error == pytest.approx(math.radians(5.0))
     assert settings.pose_period_ns == 10_000_000
     limits = settings.envelope
-    assert (limits.speed, limits.turn_rate, limits.period_s) == (pytest.approx(0.15), 0.25, 0.01)
+    assert (limits.speed, limits.turn_rate, limits.period_ns) == (pytest.approx(0.15), 0.25, 10_000_000)
 
 
 def test_an_approach_that_the_envelope_would_clamp_is_refused():

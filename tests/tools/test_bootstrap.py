@@ -98,7 +98,7 @@ def test_stamp_guards_against_doing_it_twice(recorded, tmp_path):
     venv = tmp_path / ".venv"
     venv.mkdir()
     bootstrap.set_up("runtime", venv)
-    assert commands[-1][-1] == str(ROOT)
+    assert commands[-1][-1] == f"{ROOT}[app]"
     assert "-c" in commands[-1]
     commands.clear()
     bootstrap.set_up("runtime", venv)
@@ -184,7 +184,7 @@ def test_without_uv_plain_pip_installs(recorded, tmp_path):
     venv.mkdir()
     bootstrap.set_up("runtime", venv)
     assert commands[-1][:3] == [str(venv / "bin" / "python"), "-m", "pip"]
-    assert commands[-1][-1] == str(ROOT)
+    assert commands[-1][-1] == f"{ROOT}[app]"
 
 
 def test_constraints_name_versions_and_no_hosts():

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from robot_io.error_report import printable, say_json, tell
 from robot_io.errors import ReplayDiffers, UsageError
+from robot_io.log.log_format import FORMAT_FACT
 from robot_io.rig.config import rig_from_toml, rig_to_toml
 from tools.places.find_log import find_log
 from tools.replay.difference import Difference
 from tools.replay.fold import ReplayResult, replay
 from tools.replay.verified_log import VerifiedLog
-from tools.run.run_facts import program_and_machine
+from tools.run.code_facts import COMMIT_FACT, DIRTY_FACT
+from tools.run.run_facts import code_and_machine
 from tools.run.tick_core import TickCore
 
 DIFFERS = ReplayDiffers.exit_code
@@ -38,27 +41,39 @@ def run(args: argparse.Namespace) -> int:
     if args.what_if:
         return what_if(path, args)
     result = replay(path, tolerance=args.tolerance)
-    show = tell if args.json else print
-    show(f"replay: {result.identical} of {result.ticks} ticks identical")
-    if result.world is not None:
-        show(f"world: {result.world.identical} of {result.world.states} states identical")
-    if result.gaps:
-        show(f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)")
-    for note in result.notes:
-        show(f"note: {note}")
-    differences: list[tuple[str, Difference | None]] = [("tick", result.first_difference)]
-    if result.world is not None:
-        differences.append(("world state", result.world.first_difference))
-    for name, found in differences:
-        if found is not None:
-            values = f"logged {found.logged!r}, now {found.replayed!r}"
-            show(f"first difference: {name} {found.tick}, {found.field}: {values}")
-    if result.different:
-        for line in machine_differences(result.facts):
-            show(printable(line))
+    for line in lines(result):
+        (tell if args.json else print)(printable(line))
     if args.json:
         say_json(as_json(result))
     return DIFFERS if result.different else 0
+
+
+def lines(result: ReplayResult) -> Iterator[str]:
+    """Yield the result for people."""
+    yield f"replay: {result.identical} of {result.ticks} ticks identical"
+    differences = [("tick ", result.first_difference)]
+    if result.world is not None:
+        yield f"world: {result.world.identical} of {result.world.states} states identical"
+        differences.append(("world state ", result.world.first_difference))
+    yield f"derived: {result.derived.identical} of {result.derived.messages} messages identical"
+    differences.append(("message at ", result.derived.first_difference))
+    if result.arrived is not None:
+        yield f"arrived: {result.arrived.identical} of {result.arrived.messages} messages as the ticks hold them"
+        differences.append(("message at ", result.arrived.first_difference))
+    if result.gaps:
+        yield f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)"
+    for note in result.notes:
+        yield f"note: {note}"
+    if result.made_by.note and not result.different:
+        yield f"note: {result.made_by.note}"
+    for name, found in differences:
+        if found is not None:
+            values = f"logged {found.logged!r}, now {found.replayed!r}"
+            yield f"first difference: {name}{found.tick}, {found.field}: {values}"
+    if result.different:
+        if result.made_by.cause:
+            yield result.made_by.cause
+        yield from machine_differences(result.facts)
 
 
 def as_json(result: ReplayResult) -> dict[str, Any]:
@@ -77,31 +92,48 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
             "identical": world.identical,
             "first_difference": _plain(world.first_difference),
         },
+        "derived": {
+            "messages": result.derived.messages,
+            "identical": result.derived.identical,
+            "first_difference": _plain(result.derived.first_difference),
+        },
+        "arrived": None
+        if result.arrived is None
+        else {
+            "messages": result.arrived.messages,
+            "identical": result.arrived.identical,
+            "first_difference": _plain(result.arrived.first_difference),
+        },
         "complete": result.complete,
+        "made_by": {
+            "format": result.made_by.format,
+            "commit": result.made_by.commit,
+            "dirty": result.made_by.dirty,
+            "other": result.made_by.other,
+        },
         "notes": list(result.notes),
         "machine_differences": machine_differences(result.facts),
     }
 
 
 def machine_differences(facts: dict[str, str]) -> list[str]:
-    """Return what differs between program and machine of the log and of today, in words."""
-    now = program_and_machine()
-    return [
-        f"{name} was {facts[name]}, is {value}" for name, value in now.items() if name in facts and facts[name] != value
-    ]
+    """Return what else differs between log and today, in words: versions, machine."""
+    said = (FORMAT_FACT, COMMIT_FACT, DIRTY_FACT)
+    now = {name: value for name, value in code_and_machine().items() if name in facts and name not in said}
+    return [f"{name} was {facts[name]}, is {value}" for name, value in now.items() if facts[name] != value]
 
 
 def what_if(path: Path, args: argparse.Namespace) -> int:
     """Fold the log's inputs with other settings and say what the law would have commanded."""
     log = VerifiedLog(path)
     log.require_config()
-    other = rig_from_toml(rig_to_toml(log.rig), overrides=args.what_if)
+    other = rig_from_toml(rig_to_toml(log.usable_rig()), overrides=args.what_if)
     core = TickCore.of(other, in_contact=log.in_contact)
     state = None
     count = changed = 0
     worst = 0.0
     worst_tick = -1
-    for _, _, tick in log.messages():
+    for _, _, _, tick in log.messages():
         if tick is None:
             continue
         state, output = core.fold(tick.before if state is None else state, tick.input)

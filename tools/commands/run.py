@@ -13,8 +13,9 @@ from robot_io.tick import TickInput, TickOutput, TickState
 from tools.places import run_dir, saved_tare
 from tools.places.saved_tare import SavedTare
 from tools.places.state_dir import RigLock
+from tools.places.whole_file import write_json
 from tools.report.process import ReportProcess
-from tools.rig import devices_at, resolve_rig
+from tools.rig import devices_at, folder_of, resolve_rig
 from tools.run.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
@@ -137,7 +138,7 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Saved
     try:
         from tools.run.launcher import Launcher
 
-        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig))
+        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
         figures = launcher.run()
     except BaseException:
         if launcher is None or not launcher.began:
@@ -216,7 +217,7 @@ def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
 def write_summary(summary: dict[str, Any], out: Path) -> None:
     """Write summary.json; when it cannot be, say so: the verdict is printed all the same."""
     try:
-        run_dir.write_json(out / "summary.json", summary)
+        write_json(out / "summary.json", summary)
     except OSError as error:
         tell(f"summary.json cannot be written: {error.strerror}")
 

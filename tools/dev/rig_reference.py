@@ -5,17 +5,18 @@ python -m tools.dev.rig_reference > docs/rig-files.md
 
 from __future__ import annotations
 
-import ast
 import inspect
 import sys
-from types import UnionType
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Meta
 
 from robot_io.rig import config, topics, world
 from robot_io.rig.config import RigConfig
+from robot_io.rig.renames import RENAMED, RETIRED, advice
+from tools.dev.notes import notes_of
 
 INTRO = """# Rig files
 
@@ -37,10 +38,17 @@ the nearest known one. The program's own ceilings (`safety/limits.py`) may only 
 """
 
 
+RENAMES = """
+## Renamed keys
+
+`push config check` names every one of these in a rig file, with its line. In logs they are read by the log's format.
+"""
+
+
 def reference() -> str:
     """Return the page."""
     parts = [INTRO]
-    notes = _field_notes()
+    notes = notes_of(config, topics, world)
     for title, table in _tables(RigConfig, ""):
         parts.append(f"\n## {f'[{title}]' if title else 'At the top'}\n")
         doc = inspect.cleandoc(table.__doc__ or "")
@@ -52,6 +60,8 @@ def reference() -> str:
                 continue
             note = notes.get((table.__name__, field.name), "").replace("\n", " ").replace("|", "\\|")
             parts.append(f"| `{field.name}` | {_type_text(hints[field.name])} | {_default(field)} | {note} |")
+    parts.append(RENAMES)
+    parts += [f"- {advice(key)}." for key in (*(one.old for one in RENAMED), *(one.key for one in RETIRED))]
     return "\n".join(parts) + "\n"
 
 
@@ -59,7 +69,7 @@ def _tables(table: type[msgspec.Struct], prefix: str) -> list[tuple[str, type[ms
     found = [(prefix, table)]
     hints = get_type_hints(table)
     for field in msgspec.structs.fields(table):
-        if _is_table(hints[field.name]):
+        if _is_table(hints[field.name]) and field.name != "declared":  # written by the program
             found += _tables(hints[field.name], f"{prefix}.{field.name}" if prefix else field.name)
     return found
 
@@ -78,8 +88,10 @@ def _type_text(hint: Any) -> str:
     if get_origin(hint) is tuple:
         parts = get_args(hint)
         return f"{len(parts)} x {_type_text(parts[0])}"
-    if isinstance(hint, UnionType):
-        return " or ".join(_type_text(part) for part in get_args(hint))
+    if isinstance(hint, UnionType) or get_origin(hint) is Union:
+        return " or ".join(_type_text(part) for part in get_args(hint) if part is not NoneType)
+    if get_origin(hint) is dict:
+        return "table"
     return {float: "number", int: "integer", str: "text", bool: "true or false"}.get(hint, str(hint))
 
 
@@ -89,28 +101,15 @@ def _bounds(meta: Meta) -> list[str]:
 
 
 def _default(field: msgspec.structs.FieldInfo) -> str:
-    if field.default is msgspec.NODEFAULT:
+    if field.required:
         return "required"
+    if field.default is msgspec.NODEFAULT:
+        return "empty"
+    if field.default is None:
+        return ""
     if isinstance(field.default, tuple):
         return f"`{list(field.default)}`"
     return f"`{field.default!r}`".replace("'", '"')
-
-
-def _field_notes() -> dict[tuple[str, str], str]:
-    """Return the text below each field of the source, by (class, field)."""
-    notes = {}
-    for node in (node for module in (config, topics, world) for node in ast.parse(inspect.getsource(module)).body):
-        if not isinstance(node, ast.ClassDef):
-            continue
-        for field, text in zip(node.body, node.body[1:], strict=False):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant)
-            ):
-                notes[node.name, field.target.id] = str(text.value.value)
-    return notes
 
 
 if __name__ == "__main__":

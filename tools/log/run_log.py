@@ -12,13 +12,12 @@ from robot_io.errors import LogDamaged
 from robot_io.log.chain import TickChain
 from robot_io.log.channels import BY_TOPIC, CHANNELS, Kind
 from robot_io.log.mcap_log import McapLog
-from robot_io.log.ros_messages import POSE_STAMPED, planar_pose
 from robot_io.log.seal import LogSeal, config_seal
 from robot_io.log.world_messages import STATE_CDR
 from robot_io.rig.config import rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
-from tools.log.scene_topics import scene_messages, slider_frame, slider_pose
-from tools.log.tick_topics import Message, TickTopics
+from tools.log.derivation import TICK_TOPIC, Derivation
+from tools.log.tick_topics import Message
 
 OFFSET_FACT = "wall_offset_ns"
 
@@ -31,16 +30,12 @@ class RunLog:
     """
 
     def __init__(self, path: Path, *, config_text: str, metadata: dict[str, str], wall_offset_ns: int) -> None:
-        rig = rig_from_toml(config_text)
+        self._derive = Derivation(rig_from_toml(config_text), wall_offset_ns)
         self._offset_ns = wall_offset_ns
         self._log = McapLog(path, config_text=config_text, metadata={**metadata, OFFSET_FACT: str(wall_offset_ns)})
         self._config_seal = config_seal(config_text.encode())
         self._declared: set[str] = set()
-        self._rig = rig
         self._scene_written = False
-        self._topics = TickTopics(wall_offset_ns)
-        # With motion capture of the object its pose is what was seen, else it is the world's truth.
-        self._slider_is_seen = bool(rig.base.topics.slider_pose)
         self._seal = LogSeal()
         self.chain = TickChain()
         self.undecodable = 0
@@ -60,19 +55,20 @@ class RunLog:
                 tick = None
             self.tick(time_ns, payload, tick)
         elif kind in CHANNELS:
-            self._write(Message(CHANNELS[kind].topic, time_ns + self._offset_ns, payload))
+            log_time_ns = time_ns + self._offset_ns
+            self._write(Message(CHANNELS[kind].topic, log_time_ns, payload))
             if kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
-                self._slider(kind, time_ns, payload)
+                self._slider(kind, log_time_ns, payload)
         else:
             self.unknown_kinds += 1
 
     def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
         """Chain and write one tick; `tick` is the message of `payload` (None: it cannot be decoded)."""
-        self._write(Message("/control/tick", time_ns + self._offset_ns, self.chain.link(payload)))
+        self._write(Message(TICK_TOPIC, time_ns + self._offset_ns, self.chain.link(payload)))
         if tick is None:
             self.undecodable += 1
             return
-        for derived in self._topics.expand(tick):
+        for derived in self._derive.tick(tick):
             self._write(derived)
 
     def flush(self) -> None:
@@ -98,7 +94,7 @@ class RunLog:
     def _write(self, message: Message) -> None:
         if not self._scene_written:
             self._scene_written = True  # now, because only the first record says when the log starts
-            for first in scene_messages(self._rig, message.log_time_ns):
+            for first in self._derive.scene(message.log_time_ns):
                 self._write(first)
         if message.topic not in self._declared:
             self._declared.add(message.topic)
@@ -108,17 +104,14 @@ class RunLog:
         self._seal.note(message.topic, message.log_time_ns, message.payload)
         self._log.write(message.topic, message.log_time_ns, message.payload)
 
-    def _slider(self, kind: int, time_ns: int, payload: bytes) -> None:
-        if (kind == Kind.SLIDER_POSE) != self._slider_is_seen:
-            return
-        log_time_ns = time_ns + self._offset_ns
+    def _slider(self, kind: int, log_time_ns: int, payload: bytes) -> None:
         try:
-            if kind == Kind.SLIDER_POSE:
-                pose = POSE_STAMPED.decode(payload).pose
+            if kind == Kind.WORLD_STATE:
+                made = self._derive.world(STATE_CDR.decode(payload), log_time_ns)
             else:
-                truth = STATE_CDR.decode(payload).slider
-                pose = planar_pose(truth.x, truth.y, truth.yaw)
-                self._write(slider_pose(pose, log_time_ns))
-            self._write(slider_frame(pose, log_time_ns))
+                made = self._derive.slider(payload, log_time_ns)
         except LogDamaged:
             self.undecodable += 1
+            return
+        for message in made:
+            self._write(message)

@@ -8,7 +8,11 @@ from __future__ import annotations
 
 import math
 
+from robot_io.geometry import StraightPath
 from robot_io.log.ros_messages import (
+    BASE_FRAME,
+    SENSOR_FRAME,
+    WORLD_FRAME,
     Header,
     Path,
     Pose,
@@ -25,7 +29,7 @@ from robot_io.log.ros_messages import (
 )
 from robot_io.rig.config import RigConfig
 from robot_io.rig.types import Matrix3
-from tools.log.tick_topics import BASE_FRAME, SENSOR_FRAME, WORLD_FRAME, Message, message
+from tools.log.tick_topics import Message, message
 
 BALL_FRAME, SLIDER_FRAME = "contact_ball", "slider"
 _BASE_SIZE_M = (0.960, 0.793, 0.296)
@@ -101,19 +105,13 @@ def _joint(name: str, kind: str, parent: str, child: str, xyz: tuple[float, floa
 
 
 def _path(rig: RigConfig, header: Header) -> Path:
-    heading = math.radians(rig.path.direction_deg)
-    origin_x, origin_y = rig.path.origin_m
+    path = StraightPath.of(rig.path.origin_m, rig.path.direction_deg)
     length = rig.control.distance_m + rig.path.expected_contact_m
     steps = max(1, min(1000, math.ceil(length / _PATH_STEP_M)))
     distances = (length * i / steps for i in range(steps + 1))
     return Path(
         header,
-        tuple(
-            PoseStamped(
-                header, planar_pose(origin_x + s * math.cos(heading), origin_y + s * math.sin(heading), heading)
-            )
-            for s in distances
-        ),
+        tuple(PoseStamped(header, planar_pose(*path.point_in_world(s, 0.0), path.heading)) for s in distances),
     )
 
 

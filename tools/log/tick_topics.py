@@ -12,6 +12,9 @@ from robot_io.clock import NS_PER_S
 from robot_io.log.channels import BY_TOPIC
 from robot_io.log.messages import LoopTiming, SafetyEvent
 from robot_io.log.ros_messages import (
+    BASE_FRAME,
+    SENSOR_FRAME,
+    WORLD_FRAME,
     DiagnosticArray,
     DiagnosticStatus,
     Header,
@@ -21,19 +24,18 @@ from robot_io.log.ros_messages import (
     TFMessage,
     Transform,
     TransformStamped,
-    Twist,
     TwistStamped,
     Vector3,
     Wrench,
     WrenchStamped,
+    planar_twist,
     ros_time,
     yaw_quaternion,
 )
-from robot_io.messages import BodyTwist, LinkState
+from robot_io.messages import ArmState, LinkState
 from robot_io.tick import ControlTick, FtReading, Mode
 from safety.faults import FAULTS
 
-WORLD_FRAME, BASE_FRAME, SENSOR_FRAME = "world", "base_link", "ft_sensor"
 JOINT_NAMES = (
     "shoulder_pan_joint",
     "shoulder_lift_joint",
@@ -44,6 +46,7 @@ JOINT_NAMES = (
 )
 _NO_TORQUE = Vector3(math.nan, math.nan, math.nan)
 _MODE_NAMES = {int(mode): mode.name for mode in Mode}
+_ARM_STATES = {int(state): state.name.lower() for state in ArmState}
 _INFO, _WARN, _ERROR = 20, 30, 40
 
 
@@ -79,8 +82,8 @@ class TickTopics:
         messages = [self._raw_wrench(reading) for reading in inp.ft.readings]
         force = Vector3(*tick.after.control.force_world)
         messages.append(message("/ft/wrench", now_ns, WrenchStamped(header, Wrench(force, _NO_TORQUE))))
-        messages.append(message("/base/cmd_vel_raw", now_ns, _twist(body, out.wanted_body)))
-        messages.append(message("/base/cmd_vel", now_ns, _twist(body, out.command_body)))
+        messages.append(message("/base/cmd_vel_raw", now_ns, TwistStamped(body, planar_twist(out.wanted_body))))
+        messages.append(message("/base/cmd_vel", now_ns, TwistStamped(body, planar_twist(out.command_body))))
         host = inp.host
         timing = LoopTiming(
             header, inp.tick, inp.now_ns - host.late_ns, host.late_ns, host.skipped, host.skipped > 0, host.log_dropped
@@ -144,12 +147,12 @@ class TickTopics:
         return messages
 
 
-def _twist(header: Header, twist: BodyTwist) -> TwistStamped:
-    return TwistStamped(header, Twist(Vector3(twist.vx, twist.vy, 0.0), Vector3(0.0, 0.0, twist.omega)))
-
-
 def _mode(number: int) -> str:
     return _MODE_NAMES.get(number, str(number))
+
+
+def _arm_state(number: int) -> str:
+    return _ARM_STATES.get(number, str(number))
 
 
 def _diagnostics(tick: ControlTick, header: Header) -> DiagnosticArray:
@@ -160,7 +163,7 @@ def _diagnostics(tick: ControlTick, header: Header) -> DiagnosticArray:
         header,
         (
             _status("ft300", ft.link == LinkState.UP, packets=ft.packets_ok, crc_fail=ft.crc_fail, junk=ft.junk_bytes),
-            _status("ur10", arm_up, packets=arm.packets, error=arm.error, robot_mode=arm.joints.robot_mode),
+            _status("ur10", arm_up, packets=arm.packets, error=arm.error, state=_arm_state(arm.joints.state)),
             _status(
                 "ridgeback",
                 base_up and not base.status.stop_engaged,

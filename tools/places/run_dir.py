@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import time
 from pathlib import Path
 
 from robot_io.errors import UsageError
 from robot_io.rig.config import RigConfig, rig_to_toml
+from tools.places.whole_file import check_writable
 
 MOST_IN_A_SECOND = 1000
 RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
@@ -25,9 +25,7 @@ def create(out: str | None, rig_name: str) -> Path:
         if any((path / name).exists() for name in RUN_FILES) and out:
             raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
         path = _made(path, given=bool(out))
-        probe = path / ".writable"
-        probe.touch()
-        probe.unlink()
+        check_writable(path)
     except OSError as error:
         raise UsageError(
             f"the run's folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
@@ -61,14 +59,3 @@ def write_config(path: Path, rig: RigConfig) -> str:
     text = rig_to_toml(rig)
     (path / "config.toml").write_text(text, encoding="utf-8")
     return text
-
-
-def write_json(path: Path, value: object) -> None:
-    """Write a JSON file whole or not at all."""
-    part = path.with_suffix(".part")
-    try:
-        part.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise

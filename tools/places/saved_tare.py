@@ -13,9 +13,10 @@ from pathlib import Path
 import msgspec
 
 from robot_io.errors import UsageError
+from robot_io.messages import Vector6
 from robot_io.rig.config import RigConfig
-from robot_io.tick import Vector6
 from tools.places.state_dir import file_name, state_dir
+from tools.places.whole_file import write_whole
 
 MAX_AGE_S = 12 * 3600.0
 
@@ -32,15 +33,19 @@ class SavedTare(msgspec.Struct, frozen=True):
 def power_cycle(rig: RigConfig) -> str:
     """Return what stands for the sensor's power cycle."""
     if rig.ft.level == "hardware":
-        return f"{rig.ft.port} {Path('/proc/sys/kernel/random/boot_id').read_text().strip()}"
-    parts = msgspec.json.encode((rig.world.sensor, rig.frames, rig.arm.held_pose_rad))
-    return hashlib.sha256(parts).hexdigest()
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        return f"{rig.ft.port} {boot} {_digest((rig.ft.kind, rig.ft.options, rig.ft.declared))}"
+    return _digest((rig.ft.kind, rig.ft.options, rig.ft.declared, rig.world.sensor, rig.frames, rig.arm.held_pose_rad))
+
+
+def _digest(parts: object) -> str:
+    return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
 
 
 def save(rig: RigConfig, bias: Vector6, joints: Vector6) -> None:
     """Keep a tare for later runs of this rig."""
     tare = SavedTare(bias, joints, power_cycle(rig), time.time())
-    _path(rig).write_bytes(msgspec.json.encode(tare))
+    write_whole(_path(rig), msgspec.json.encode(tare))
 
 
 def load(rig: RigConfig) -> SavedTare:

@@ -19,9 +19,14 @@ class Difference(msgspec.Struct, frozen=True):
     replayed: Any
 
 
-def difference(tick: int, logged: Any, mine: Any, tolerance: float | None) -> Difference | None:
-    """Return the first leaf that differs: by a bit (-0.0 is not 0.0, NaN equals NaN), or by more than `tolerance`."""
-    for name, old, new in _leaves(logged, mine):
+def difference(
+    tick: int, logged: Any, mine: Any, tolerance: float | None, passed_over: frozenset[str] = frozenset()
+) -> Difference | None:
+    """Return the first leaf that differs: by a bit (-0.0 is not 0.0, NaN equals NaN), or by more than `tolerance`.
+
+    passed_over: dotted paths of fields, those in elements of arrays without their index.
+    """
+    for name, old, new in _leaves(logged, mine, passed_over):
         if isinstance(old, float) and isinstance(new, float):
             same = _same_bits(old, new) if tolerance is None else _close(old, new, tolerance)
         else:
@@ -39,13 +44,19 @@ def _close(old: float, new: float, tolerance: float) -> bool:
     return old == new or abs(old - new) <= tolerance or (math.isnan(old) and math.isnan(new))
 
 
-def _leaves(logged: Any, mine: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield (dotted name, logged, replayed) of every leaf."""
+def _leaves(
+    logged: Any, mine: Any, passed_over: frozenset[str], name: str = "", path: str = ""
+) -> Iterator[tuple[str, Any, Any]]:
+    """Yield (dotted name, logged, replayed) of every leaf; `path` is the name without indexes."""
+    if path in passed_over:
+        return
     if isinstance(logged, msgspec.Struct) and isinstance(mine, msgspec.Struct):
         for key in logged.__struct_fields__:
-            yield from _leaves(getattr(logged, key), getattr(mine, key), f"{name}.{key}" if name else key)
+            dot = "." if name else ""
+            inner = getattr(logged, key), getattr(mine, key)
+            yield from _leaves(*inner, passed_over, f"{name}{dot}{key}", f"{path}{dot}{key}")
     elif isinstance(logged, tuple) and isinstance(mine, tuple) and len(logged) == len(mine):
         for i, (old, new) in enumerate(zip(logged, mine, strict=True)):
-            yield from _leaves(old, new, f"{name}[{i}]")
+            yield from _leaves(old, new, passed_over, f"{name}[{i}]", path)
     else:
         yield name, logged, mine

@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-from robot_io.errors import LogDamaged, PushError
+import msgspec
+
+from robot_io.cdr.cdr_type import CdrType
+from robot_io.errors import LogDamaged, PushError, ReplayDiffers
 from robot_io.log.chain import TickChain
+from robot_io.log.log_format import format_of
+from robot_io.log.logged_type import LoggedType
 from robot_io.log.mcap_log import CONFIG_ATTACHMENT, END_METADATA, RUN_METADATA
-from robot_io.log.mcap_read import LogMessage, read_log, read_summary
+from robot_io.log.mcap_read import LogMessage, LogSummary, read_log, read_summary
 from robot_io.log.mcap_recover import RECOVERED_METADATA
-from robot_io.log.seal import CONFIG_FACT, LogSeal, config_seal
-from robot_io.rig.config import RigConfig, rig_from_toml
+from robot_io.log.seal import CONFIG_FACT, LogSeal, PayloadSeal, config_seal, seal_of
+from robot_io.rig.config import RigConfig
+from robot_io.rig.logged import rig_of_log
 from robot_io.tick import TICK_CDR, ControlTick
+from tools.log.derivation import TICK_TOPIC
 from tools.log.run_log import OFFSET_FACT
+from tools.replay.made_by import MadeBy, made_by
+from tools.run.code_facts import code_facts
 
-TICK_TOPIC = "/control/tick"
+MessageT = TypeVar("MessageT", bound=msgspec.Struct)
 DO_DAMAGED = "Do not trust this log from there on; `push log info` shows what it holds"
 
 
@@ -24,6 +33,7 @@ class Item(NamedTuple):
     """One message; `tick` is the decoded one of `/control/tick`."""
 
     topic: str
+    log_time_ns: int
     payload: bytes
     tick: ControlTick | None
 
@@ -31,7 +41,7 @@ class Item(NamedTuple):
 class VerifiedLog:
     """The rig and facts of a log, after every checksum of the file was verified, and then its messages.
 
-    Raises UsageError when it cannot be opened, LogDamaged when it cannot be trusted.
+    Raises UsageError when it cannot be opened or is of a later format, LogDamaged when it cannot be trusted.
     """
 
     def __init__(self, path: Path) -> None:
@@ -40,18 +50,35 @@ class VerifiedLog:
         self._end = summary.metadata.get(END_METADATA)
         self._saved = summary.metadata.get(RECOVERED_METADATA)
         self.facts = summary.metadata.get(RUN_METADATA, {})
+        self.channels = summary.channels
+        self.made_by: MadeBy = made_by(self.facts, code_facts(), format_of(self.facts, str(path)))
         try:
-            self.rig: RigConfig = rig_from_toml(summary.attachments[CONFIG_ATTACHMENT].decode())
-        except (KeyError, UnicodeDecodeError, RecursionError, PushError) as error:
-            why = "it is missing" if isinstance(error, KeyError) else str(error).splitlines()[0]
-            raise self._damaged(f"the log holds no usable {CONFIG_ATTACHMENT}: {why}") from None
-        end = self._end if self._end is not None else self._saved
-        if end is None:
-            raise self._damaged("the log does not say how it ends")
-        seal = config_seal(summary.attachments[CONFIG_ATTACHMENT])
-        self.config_holds = end.get(CONFIG_FACT) == seal[CONFIG_FACT]
+            self.ticks = self.type_of(TICK_TOPIC, TICK_CDR)
+        except LogDamaged as error:
+            raise self._damaged(error.what) from None
+        self.config_holds = self._seal_of_config_holds(summary)
         """Whether config.toml is the one that the log was finished with."""
-        self._channels = summary.channels
+        self.notes: tuple[str, ...] = ()
+        """What of the config means nothing today, and what is not sealed."""
+        self._rig = self._read_rig(summary)
+        if self._end is None and self._saved is None:
+            raise self._damaged("the log does not say how it ends")
+
+    def usable_rig(self) -> RigConfig:
+        """Return the rig. Raises ReplayDiffers when only the code that made the log could use it, LogDamaged first."""
+        if isinstance(self._rig, RigConfig):
+            return self._rig
+        for _ in self.messages():  # damage first
+            continue
+        raise ReplayDiffers(
+            f"{self.made_by.cause}: its {CONFIG_ATTACHMENT} cannot be used today: {self._rig}",
+            where=str(self.path),
+            do="Replay it with the code that made it",
+        )
+
+    @property
+    def _end_facts(self) -> dict[str, str]:
+        return self._end if self._end is not None else self._saved or {}
 
     @property
     def complete(self) -> bool:
@@ -63,14 +90,27 @@ class VerifiedLog:
         """Whether the run started in contact."""
         return self.facts.get("in_contact") == "True"
 
+    @property
+    def wall_offset_ns(self) -> int:
+        """What was added to the times of ticks to get their log times; 0 when the log does not say it."""
+        said = self.facts.get(OFFSET_FACT, "")
+        return int(said) if said.removeprefix("-").isdecimal() and len(said) < 25 else 0
+
+    def type_of(self, topic: str, today: CdrType[MessageT]) -> LoggedType[MessageT]:
+        """Return how the log's messages of a topic are read as today's. Raises LogDamaged when they cannot be."""
+        for channel in self.channels:
+            if channel.topic == topic:
+                return LoggedType(today, channel.schema_name, channel.schema_text, self.made_by.format)
+        return LoggedType(today, today.name, today.schema_text, self.made_by.format)
+
     def dropped(self, ring: str) -> bool:
-        """Tell whether records of a ring are known to be missing, because it was full."""
+        """Return whether records of a ring are known to be missing, because it was full."""
         return (self._end or {}).get(f"dropped_{ring}", "0") != "0"
 
     def messages(self) -> Iterator[Item]:
         """Yield every message in the order of the file. Take all before trusting any: the end may raise LogDamaged."""
-        chain, seal = TickChain(), LogSeal()
-        for channel in self._channels:
+        chain, seal = TickChain(), seal_of(self._end_facts, self.made_by.format)
+        for channel in self.channels:
             seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
         last = -1
         for message in read_log(self.path):
@@ -79,15 +119,42 @@ class VerifiedLog:
             if message.topic == TICK_TOPIC:
                 tick = self._tick(message, last, chain.holds(message.payload))
                 last = tick.input.tick
-            yield Item(message.topic, message.payload, tick)
+            yield Item(message.topic, message.log_time_ns, message.payload, tick)
         self._check_end(chain, seal, last)
+
+    def _seal_of_config_holds(self, summary: LogSummary) -> bool:
+        if self._end_facts and self.made_by.format == 1 and CONFIG_FACT not in self._end_facts:
+            return True  # it was not sealed then, as the notes say
+        return (
+            self._end_facts.get(CONFIG_FACT)
+            == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
+        )
+
+    def _read_rig(self, summary: LogSummary) -> RigConfig | str:
+        """Return the rig, or why today's program cannot use it though the log is whole."""
+        try:
+            rig, notes = rig_of_log(summary.attachments[CONFIG_ATTACHMENT].decode(), self.made_by.format)
+        except (KeyError, UnicodeDecodeError, RecursionError, PushError) as error:
+            why = "it is missing" if isinstance(error, KeyError) else " ".join(str(error).split())
+            if self.config_holds and self.made_by.other and isinstance(error, PushError):
+                return why
+            raise self._damaged(f"the log holds no usable {CONFIG_ATTACHMENT}: {why}") from None
+        self.notes = (*self._seal_notes(), *notes)
+        return rig
+
+    def _seal_notes(self) -> list[str]:
+        """Return what of a log of the first format was never sealed."""
+        if self.made_by.format > 1 or "message_sum" in self._end_facts:
+            return []
+        what = "types and times of messages" if "payload_sum" in self._end_facts else "messages but ticks"
+        return [f"the log's seal does not cover its config.toml, nor {what}"]
 
     def _tick(self, message: LogMessage, last: int, chained: bool) -> ControlTick:
         if not chained:
             named = "the first tick" if last < 0 else f"tick {last} or {last + 1}"
             raise self._damaged(f"{named} was altered, or ticks are missing there: the chain of checksums breaks")
         try:
-            tick = TICK_CDR.decode(message.payload)
+            tick = self.ticks.decode(message.payload)
         except LogDamaged as error:
             named = "the first tick" if last < 0 else f"tick {last + 1}"
             raise self._damaged(f"{named} was altered: {error.what}") from None
@@ -95,10 +162,10 @@ class VerifiedLog:
             raise self._damaged(f"tick {tick.input.tick} was altered: its time in the log is not its own")
         return tick
 
-    def _check_end(self, chain: TickChain, seal: LogSeal, last: int) -> None:
+    def _check_end(self, chain: TickChain, seal: LogSeal | PayloadSeal, last: int) -> None:
         if chain.ticks == 0:
             raise LogDamaged("the log holds no tick", where=str(self.path), do="The run ended before its loop began")
-        wanted = self._end if self._end is not None else self._saved or {}
+        wanted = self._end_facts
         if self._end is not None:
             ticks = {"ticks": str(chain.ticks), "last_tick_crc32": f"{chain.crc32:08x}"}
             if any(wanted.get(name) != value for name, value in ticks.items()):

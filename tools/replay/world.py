@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import NamedTuple
 
 import msgspec
 
-from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR, WorldState
+from robot_io.log.logged_type import LoggedType
+from robot_io.log.world_messages import STATE_CDR, WorldCommand, WorldStart, WorldState
 from robot_io.rig.config import RigConfig
 from sim_backend.world.base_plant import GRID_NS
 from sim_backend.world.world import STATE_EVERY_STEPS, World, WorldRecord
@@ -23,11 +25,20 @@ class WorldReplay(msgspec.Struct, frozen=True):
     first_difference: Difference | None
 
 
+class WorldTypes(NamedTuple):
+    """How a log's records of the world are read."""
+
+    start: LoggedType[WorldStart]
+    command: LoggedType[WorldCommand]
+    state: LoggedType[WorldState]
+
+
 class WorldReplayer:
     """Takes the world's records in the order of the log."""
 
-    def __init__(self, rig: RigConfig, tolerance: float | None = None) -> None:
+    def __init__(self, rig: RigConfig, types: WorldTypes, tolerance: float | None = None) -> None:
         self._rig = rig
+        self._types = types
         self._tolerance = tolerance
         self._world: World | None = None
         self._made: deque[WorldState] = deque()
@@ -37,7 +48,7 @@ class WorldReplayer:
     def take(self, topic: str, payload: bytes) -> None:
         """Take one record. Raises LogDamaged when it cannot be read."""
         if topic == "/world/start":
-            start = START_CDR.decode(payload)
+            start = self._types.start.decode(payload)
             self._made.clear()
             self._world = World(self._rig, start.seed, start.start_ns, self._keep)
         elif self._world is None:
@@ -56,7 +67,7 @@ class WorldReplayer:
             self._made.append(record)
 
     def _command(self, world: World, payload: bytes) -> None:
-        command = COMMAND_CDR.decode(payload)
+        command = self._types.command.decode(payload)
         try:
             if command.is_switch:
                 world.set_drivers(command.drivers_active, command.arrival_ns)
@@ -71,11 +82,15 @@ class WorldReplayer:
         mine = self._made.popleft()
         self._states += 1
         found = None
-        try:
-            same = STATE_CDR.encode(mine) == payload
-        except ValueError:  # it began at the end of all times
-            same = False
-        if not same:
-            found = difference(mine.t_ns, STATE_CDR.decode(payload), mine, self._tolerance)
+        if not self._types.state.exact or not _is(mine, payload):
+            logged = self._types.state.decode(payload)
+            found = difference(mine.t_ns, logged, mine, self._tolerance, self._types.state.missing)
         self._identical += found is None
         self._first = self._first or found
+
+
+def _is(state: WorldState, payload: bytes) -> bool:
+    try:
+        return STATE_CDR.encode(state) == payload
+    except ValueError:  # it began at the end of all times
+        return False

@@ -10,7 +10,6 @@ import base64
 import html
 import importlib
 import json
-import os
 import re
 import sys
 import zlib
@@ -22,6 +21,7 @@ from typing import Any
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.log.mcap_walk import Grown
 from safety.faults import FAULTS
+from tools.places.whole_file import write_whole
 from tools.report import words
 from tools.report.run_data import RunData, read_run
 from tools.report.style import PHASE_COLOURS, phase_spans
@@ -56,12 +56,9 @@ def write_report(log: Path, out_html: Path, *, grown: Grown | None = None) -> di
         raise UsageError("there is already a report of another run", where=str(out_html), do="Give another --out")
     pngs = figures(run)
     text = page(run, read_summary_file(log.with_name("summary.json")), pngs, mark)
-    part = out_html.with_name(f".{out_html.name}.{os.getpid()}.part")
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(out_html)
+        write_whole(out_html, text.encode())
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise EnvironmentFault(f"the report cannot be written: {error.strerror}", where=str(out_html)) from None
     return pngs
 

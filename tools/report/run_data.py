@@ -7,17 +7,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Message, Metadata
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.clock import NS_PER_S
 from robot_io.errors import LogDamaged, PushError
-from robot_io.geometry import wrap_angle, yaw_from_quaternion
-from robot_io.log.mcap_walk import Grown, walk
+from robot_io.geometry import StraightPath, wrap_angle, yaw_from_quaternion
+from robot_io.log.log_format import format_of
+from robot_io.log.logged_type import LoggedType
+from robot_io.log.mcap_log import RUN_METADATA
+from robot_io.log.mcap_walk import Grown, Topic, walk
 from robot_io.log.messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
 from robot_io.log.ros_messages import POSE_STAMPED
 from robot_io.log.world_messages import STATE_CDR
-from robot_io.rig.config import RigConfig, rig_from_toml
+from robot_io.rig.config import RigConfig
+from robot_io.rig.logged import rig_of_log
 from robot_io.tick import TICK_CDR, ControlTick, Phase
 from tools.report.bounded_series import Floats, Series, Span, Spans, Tally
 
@@ -92,15 +96,12 @@ def read_run(path: Path, *, grown: Grown | None = None) -> RunData:
     """
     reader = _Reader(path)
     topics: dict[int, str] = {}
-    schemas: dict[int, bytes] = {}
     for item in walk(path, grown=grown):
         if isinstance(item, Message):
             reader.message(topics[item.channel_id], item.log_time, item.data)
-        elif isinstance(item, Channel):
-            topics[item.id] = item.topic
-            reader.channel(item.topic, schemas[item.schema_id])
-        elif isinstance(item, Schema):
-            schemas[item.id] = item.data
+        elif isinstance(item, Topic):
+            topics[item.channel.id] = item.channel.topic
+            reader.channel(item.channel.topic, item.schema.name, item.schema.data)
         elif isinstance(item, Attachment) and item.name == "config.toml":
             reader.config(item.data)
         elif isinstance(item, Metadata):
@@ -115,7 +116,9 @@ class _Reader:
         self.metadata: dict[str, dict[str, str]] = {}
         self._path = path
         self._text = ""
+        self._config: bytes | None = None
         self._rig: RigConfig | None = None
+        self._types: dict[str, LoggedType[Any]] = {}
         self._ticks = Series(TICK_COLUMNS)
         self._world = Series(SLIDER_COLUMNS)
         self._seen = Series(SLIDER_COLUMNS)
@@ -135,23 +138,19 @@ class _Reader:
         self._end_s = 0.0
 
     def config(self, data: bytes) -> None:
-        """Take the rig of the run."""
-        try:
-            self._text = data.decode()
-            self._rig = rig_from_toml(self._text)
-        except (UnicodeDecodeError, PushError) as error:
-            raise self._foreign(f"its config.toml cannot be used: {error}") from None
-        heading = math.radians(self._rig.path.direction_deg)
-        self._cos, self._sin = math.cos(heading), math.sin(heading)
+        """Take the rig of the run; its format stands in the metadata, so it is read with the first tick."""
+        self._config = data
 
-    def channel(self, topic: str, schema: bytes) -> None:
+    def channel(self, topic: str, schema_name: str, schema: bytes) -> None:
         """Take the declaration of a topic."""
-        if topic in READ and schema != READ[topic].schema_text.encode():
-            raise LogDamaged(
-                f"another version of this program wrote its {topic}",
-                where=str(self._path),
-                do=f"Use the version that wrote it ({self.metadata.get('run', {}).get('program', 'not named')})",
-            )
+        if topic not in READ:
+            return
+        text = schema.decode(errors="replace")
+        its_format = self._format()
+        try:
+            self._types[topic] = LoggedType(READ[topic], schema_name, text, its_format)
+        except LogDamaged as error:
+            raise self._foreign(f"its {topic}: {error.what}") from None
 
     def message(self, topic: str, log_time_ns: int, payload: bytes) -> None:
         """Take one message."""
@@ -163,19 +162,19 @@ class _Reader:
         if topic == "/control/tick":
             self._tick(time_s, payload)
         elif topic == "/loop/timing":
-            timing = LOOP_TIMING.decode(payload)
+            timing = self._types[topic].decode(payload)
             self._late.add(timing.late_ns * 1e-6)
             self._skipped += timing.skipped
             if timing.skipped and len(self._skips) < MOST_SKIPS:
                 self._skips.append((time_s, timing.skipped))
         elif topic == "/safety/event":
-            self._event(time_s, SAFETY_EVENT.decode(payload))
+            self._event(time_s, self._types[topic].decode(payload))
         elif topic == "/world/state" and self._world.wants():
-            slider = STATE_CDR.decode(payload).slider
+            slider = self._types[topic].decode(payload).slider
             self._world.add((time_s, slider.x, slider.y, slider.yaw))
         # A simulated run's /slider/pose is made of the world's state, so the world goes first.
         elif topic == "/slider/pose" and not len(self._world) and self._seen.wants():
-            pose = POSE_STAMPED.decode(payload).pose
+            pose = self._types[topic].decode(payload).pose
             turned = pose.orientation
             yaw = yaw_from_quaternion(turned.x, turned.y, turned.z, turned.w)
             at = pose.position
@@ -183,9 +182,8 @@ class _Reader:
 
     def finish(self) -> RunData:
         """Return what was read."""
-        if self._rig is None:
-            raise self._foreign("it holds no config.toml")
-        last = TICK_CDR.decode(self._last_payload) if self._last_payload else None
+        rig = self._read_rig("it holds no config.toml")
+        last = self._types["/control/tick"].decode(self._last_payload) if self._last_payload else None
         recovered = self.metadata.get("recovered")
         ticks, world, seen = self._ticks.arrays(), self._world.arrays(), self._seen.arrays()
         for table in (ticks, world, seen):
@@ -193,7 +191,7 @@ class _Reader:
         source = "world" if len(self._world) else "motion capture" if len(self._seen) else ""
         return RunData(
             log=self._path,
-            rig=self._rig,
+            rig=rig,
             facts={key: value for record in self.metadata.values() for key, value in record.items()},
             recovered=(recovered.get("cause", "") or "truncated") if recovered is not None else "",
             ticks=ticks,
@@ -212,22 +210,22 @@ class _Reader:
             messages=self._messages,
             duration_s=self._end_s - self._first_tick_s,
             config_text=self._text,
-            run_facts=self.metadata.get("run", {}),
+            run_facts=self.metadata.get(RUN_METADATA, {}),
         )
 
     def _tick(self, time_s: float, payload: bytes) -> None:
         if self._rig is None:
-            raise self._foreign("it holds no config.toml before its first tick")
+            self._read_rig("it holds no config.toml before its first tick")
         self._count += 1
         self._last_payload = payload
         if not self._ticks.wants():
             return
-        tick = TICK_CDR.decode(payload)
+        tick = self._types["/control/tick"].decode(payload)
         if self._first is None:
             self._first = tick
             self._first_tick_s = time_s
             self._modes.begin("", str(tick.after.safety.mode), "", time_s)
-        self._ticks.add(self._row(self._rig, tick, time_s))
+        self._ticks.add(self._row(tick, time_s))
         if tick.input.ft.readings:
             self._last_reading_ns = tick.input.ft.readings[-1].received_ns
         now_ns = tick.input.now_ns
@@ -239,10 +237,9 @@ class _Reader:
             if at_ns:
                 self._ages[device].add((now_ns - at_ns) * 1e-6)
 
-    def _row(self, rig: RigConfig, tick: ControlTick, time_s: float) -> tuple[float, ...]:
+    def _row(self, tick: ControlTick, time_s: float) -> tuple[float, ...]:
         control, output, base = tick.after.control, tick.output, tick.input.base
-        x, y = output.contact_x - rig.path.origin_m[0], output.contact_y - rig.path.origin_m[1]
-        fx, fy, _ = control.force_world
+        path = self._path_frame
         raw = math.nan
         if control.tared and tick.input.ft.readings:
             raw = math.dist(tick.input.ft.readings[-1].force, control.bias_force)
@@ -251,10 +248,9 @@ class _Reader:
         held = control.phase >= Phase.APPROACH and math.isfinite(turned)
         return (
             time_s,
-            x * self._cos + y * self._sin,
-            y * self._cos - x * self._sin,
-            fx * self._cos + fy * self._sin,
-            fy * self._cos - fx * self._sin,
+            path.along(output.contact_x, output.contact_y),
+            path.lateral(output.contact_x, output.contact_y),
+            *path.vector_to_path(*control.force_world[:2]),
             raw,
             control.theta_f if driven and control.phase == Phase.PUSH else math.nan,
             control.theta_p if driven else math.nan,
@@ -272,6 +268,21 @@ class _Reader:
             self._faults.begin(event.fault, event.fault, event.text, time_s)
         else:
             self._faults.end(event.fault, time_s)
+
+    def _format(self) -> int:
+        return format_of(self.metadata.get(RUN_METADATA, {}), str(self._path))
+
+    def _read_rig(self, missing: str) -> RigConfig:
+        if self._config is None:
+            raise self._foreign(missing)
+        its_format = self._format()
+        try:
+            self._text = self._config.decode()
+            self._rig = rig_of_log(self._text, its_format).rig
+        except (UnicodeDecodeError, PushError) as error:
+            raise self._foreign(f"its config.toml cannot be used: {error}") from None
+        self._path_frame = StraightPath.of(self._rig.path.origin_m, self._rig.path.direction_deg)
+        return self._rig
 
     def _foreign(self, what: str) -> LogDamaged:
         return LogDamaged(

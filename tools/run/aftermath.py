@@ -8,7 +8,7 @@ from typing import Any
 from control.run_notes import RunNotes, outcome
 from robot_io.errors import LogDamaged
 from robot_io.log.mcap_read import read_log
-from robot_io.log.messages import SAFETY_EVENT, SafetyEvent
+from robot_io.log.messages import GATE_SAYS, SAFETY_EVENT, SafetyEvent
 from robot_io.tick import TICK_CDR, ControlTick, Mode
 
 
@@ -30,7 +30,7 @@ def figures_of(log: Path, rate_hz: float, exit_code: int) -> dict[str, Any]:
             skipped += last.input.host.skipped
         elif message.topic == "/safety/event":
             event = SAFETY_EVENT.decode(message.payload)
-            if event.text.startswith("gate: "):
+            if event.text.startswith(GATE_SAYS):
                 of_gate.append(event)
     if last is None:
         raise LogDamaged("the log holds no tick", where=str(log), do="The run ended before its loop began")

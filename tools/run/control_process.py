@@ -14,14 +14,16 @@ import msgspec
 
 from control.loop import ControlLoop, Watch
 from control.run_notes import outcome
+from robot_io.driver import Sensor
 from robot_io.errors import PushError
-from robot_io.ft300.driver import Ft300
 from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
+from robot_io.kinds import build_driver, started
 from robot_io.rig.config import rig_from_toml
 from robot_io.ur10.driver import ArmLink
+from tools.kinds import name_of
 from tools.run.jobs import ControlJob
 from tools.run.run_state import first_state, status_line
 from tools.run.tick_core import TickCore
@@ -34,13 +36,14 @@ VERDICT_WITHIN_S = 60.0
 class DriverWarnings(logging.Handler):
     """Passes on what the sensor's driver warns of (a USB adapter that delivers late): nobody sees our stderr."""
 
-    def __init__(self, status: StatusPipe) -> None:
+    def __init__(self, status: StatusPipe, name: str) -> None:
         super().__init__(logging.WARNING)
         self._status = status
+        self._name = name
 
     def emit(self, record: logging.LogRecord) -> None:
         """Say it to the launcher."""
-        self._status.say("warning", text=f"ft300: {record.getMessage()}")
+        self._status.say("warning", text=f"{self._name}: {record.getMessage()}")
 
 
 def main() -> int:
@@ -50,9 +53,13 @@ def main() -> int:
     die_with_parent(job.launcher_pid)
     set_timer_slack_1ns()
     status = StatusPipe(job.status_fd)
-    logging.getLogger("robot_io").addHandler(DriverWarnings(status))
     rig = rig_from_toml(job.rig_toml)
-    sensor = Ft300(job.ft_port)
+    logging.getLogger().addHandler(DriverWarnings(status, name_of(rig.ft.kind)))
+    try:
+        sensor: Sensor = build_driver("ft", rig.ft.kind, rig.ft.port, rig.ft.options, folder=job.kind_folder)
+    except PushError as error:
+        status.error(error)
+        return error.exit_code
     core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = GateLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
@@ -61,6 +68,7 @@ def main() -> int:
         core.fold,
         first_state(job.saved_tare),
         rate_hz=rig.loop.rate_hz,
+        sensor_rate_hz=rig.ft.declared.rate_hz,
         sensor=sensor,
         arm=arm,
         base=base,
@@ -71,8 +79,7 @@ def main() -> int:
     )
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     try:
-        info = sensor.open()
-        sensor.start()
+        info = started(sensor, "ft", rig.ft.kind)
         signal.signal(signal.SIGTERM, lambda *_: loop.stop_requested())
     except PushError as error:
         sensor.close()
@@ -97,7 +104,7 @@ def main() -> int:
     return _finish(loop, sensor, status, rig.loop.rate_hz)
 
 
-def _wait_for_go(operator_fd: int, sensor: Ft300) -> bool:
+def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
     """Wait until the launcher says that every device is ready; keep the sensor drained meanwhile."""
     os.set_blocking(operator_fd, False)
     while True:
@@ -107,7 +114,7 @@ def _wait_for_go(operator_fd: int, sensor: Ft300) -> bool:
             return os.read(operator_fd, 1) == b"G"
 
 
-def _finish(loop: ControlLoop, sensor: Ft300, status: StatusPipe, rate_hz: float) -> int:
+def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float) -> int:
     counters = sensor.health().counters
     sensor.stop()
     sensor.close()

@@ -6,10 +6,8 @@ a moment, so that the wheels are seen to come to rest and the log holds it.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import math
-import os
 import signal
 import sys
 
@@ -18,20 +16,19 @@ import msgspec
 from robot_io.clock import NS_PER_MS, monotonic_ns
 from robot_io.errors import PushError
 from robot_io.ipc.event_loop import EventLoop
-from robot_io.ipc.process import lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import rig_from_toml
 from sim_backend.world.world import World
 from tools.log.world_log import into
-from tools.run.emulators import OPENERS, endpoint
+from tools.run.emulators import Emulator, address_of, open_emulator
 from tools.run.jobs import EmulatorJob
 
 PRIORITY = 70
 LINGER_NS = 1_000 * NS_PER_MS
 REST_NS = 100 * NS_PER_MS
 WATCH_NS = 20 * NS_PER_MS
-_PR_SET_PDEATHSIG = 1
 
 
 class Ending:
@@ -66,35 +63,38 @@ def main() -> int:
     """Serve until SIGTERM."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=EmulatorJob)
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGTERM), 0, 0, 0)
-    if os.getppid() != job.launcher_pid:
-        return 1
+    die_with_parent(job.launcher_pid, signal.SIGTERM)
     set_timer_slack_1ns()
     status = StatusPipe(job.status_fd)
     rig = rig_from_toml(job.rig_toml)
     loop = EventLoop()
     ring = Ring(job.ring_fd)
-    opened = []
+    opened: dict[str, Emulator] = {}
     try:
         world = World(rig, job.seed, monotonic_ns(), into(ring.push))
-        opened = [OPENERS[device](loop, world, rig) for device in job.devices]
+        for device in job.devices:
+            opened[device] = open_emulator(loop, world, rig, device, job.kind_folder)
     except PushError as error:
-        for emulator in opened:
+        for emulator in opened.values():
             emulator.close()
         status.error(error)
         return error.exit_code
     Ending(loop, world)
-    status.say("ready", endpoints=[endpoint(emulator) for emulator in opened], realtime=try_realtime(PRIORITY))
+    status.say(
+        "ready",
+        addresses={device: address_of(emulator) for device, emulator in opened.items()},
+        realtime=try_realtime(PRIORITY),
+    )
     gc.collect()
     gc.freeze()
     lock_memory()
     loop.run()
-    for emulator in opened:
+    for emulator in opened.values():
         emulator.close()
     status.say(
         "finished",
         world_stalls=world.stalls,
-        counters={endpoint_["device"]: emulator.counters for emulator in opened for endpoint_ in [endpoint(emulator)]},
+        counters={device: emulator.counters for device, emulator in opened.items()},
     )
     return 0
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
+from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.errors import EnvironmentFault
 from robot_io.ipc.event_loop import EventLoop
+from robot_io.kinds import find_kind
 from robot_io.rig.config import RigConfig
 from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.ridgeback.emulator import RosbridgeEmulator
 from sim_backend.ridgeback.settings import ridgeback_settings
 from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.world.world import World
+from tools.rig import kinds_of
 
 ARM_HOSTS = tuple(f"127.0.0.{last}" for last in range(10, 250))
 """A UR10's ports are fixed, so each emulated arm needs a loopback address of its own."""
@@ -61,17 +64,60 @@ def open_ridgeback(
 
 
 OPENERS: dict[str, Callable[[EventLoop, World, RigConfig], Emulator]] = {
-    "ft300": open_ft300,
-    "ur10": open_ur10,
-    "ridgeback": open_ridgeback,
+    "robotiq-ft300": open_ft300,
+    "ur": open_ur10,
+    "ridgeback-rosbridge": open_ridgeback,
 }
+"""How the emulator of each shipped kind is opened."""
+
+
+class OwnEmulator:
+    """The emulator that a kind outside this project names: its `tick(now_ns)` is called every `period_s`."""
+
+    def __init__(self, loop: EventLoop, emulator: Any) -> None:
+        self._emulator = emulator
+        self._timer = loop.call_every(round(emulator.period_s * NS_PER_S), lambda _: emulator.tick(monotonic_ns()))
+
+    @property
+    def address(self) -> str:
+        """Where its driver finds it."""
+        return str(self._emulator.address)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Counts by name."""
+        return dict(self._emulator.counters)
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._timer.cancel()
+        self._emulator.close()
+
+
+def open_emulator(loop: EventLoop, world: World, rig: RigConfig, device: str, folder: str) -> Emulator:
+    """Open the emulator of the rig's ft, arm or base. Raises ConfigError and EnvironmentFault.
+
+    folder: where else the module of its kind may be.
+    """
+    kind = kinds_of(rig)[device]
+    if kind in OPENERS:
+        return OPENERS[kind](loop, world, rig)
+    options = {"ft": rig.ft.options, "arm": rig.arm.options, "base": rig.base.options}[device]
+    return OwnEmulator(loop, find_kind(device, kind, folder).Emulator(world, options))
 
 
 def endpoint(emulator: Emulator) -> dict[str, str]:
-    """Return where an emulator can be reached: its `port`, `host` or `url`."""
+    """Return where an emulator can be reached, as `push emulate` says it: its `port`, `host` or `url`."""
     if isinstance(emulator, Ft300Emulator):
         return {"device": "ft300", "port": emulator.port}
     if isinstance(emulator, UrEmulator):
         return {"device": "ur10", "host": emulator.host}
+    if isinstance(emulator, OwnEmulator):
+        return {"device": "own", "address": emulator.address}
     assert isinstance(emulator, RosbridgeEmulator)
     return {"device": "ridgeback", "url": emulator.url}
+
+
+def address_of(emulator: Emulator) -> str:
+    """Return what the emulator's driver takes as its address."""
+    return next(value for name, value in endpoint(emulator).items() if name != "device")

@@ -11,7 +11,8 @@ class ControlJob(msgspec.Struct, frozen=True):
     """For `tools.run.control_process`."""
 
     rig_toml: str
-    ft_port: str
+    kind_folder: str
+    """Where else the module of the sensor's kind may be."""
     saved_tare: SavedTare | None
     launcher_pid: int
     gate_fd: int
@@ -25,12 +26,24 @@ class ControlJob(msgspec.Struct, frozen=True):
     recorder_pidfd: int
 
 
+class ArmKindJob(msgspec.Struct, frozen=True):
+    """For `tools.run.arm_process`."""
+
+    rig_toml: str
+    kind_folder: str
+    launcher_pid: int
+    record_fd: int
+    status_fd: int
+
+
 class EmulatorJob(msgspec.Struct, frozen=True):
     """For `tools.run.emulator_process`."""
 
     rig_toml: str
+    kind_folder: str
     seed: int
     devices: tuple[str, ...]
+    """Which of ft, arm and base are emulated."""
     launcher_pid: int
     ring_fd: int
     status_fd: int

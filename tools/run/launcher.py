@@ -23,8 +23,10 @@ from robot_io.ipc.process import leave_realtime, try_realtime
 from robot_io.ipc.spawn import Child
 from robot_io.rig.config import RigConfig
 from safety.gate import Latch
+from tools.kinds import name_of
 from tools.places import run_dir
 from tools.places.saved_tare import SavedTare
+from tools.places.whole_file import write_json
 from tools.run.aftermath import figures_of
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
@@ -52,14 +54,18 @@ ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "rec
 class Launcher:
     """One run at level emulated, hardware or a mix; `run` returns the figures of its end, `notes` what else to say."""
 
-    def __init__(self, rig: RigConfig, out: Path, *, seed: int, saved: SavedTare | None, live: LiveLine) -> None:
+    def __init__(
+        self, rig: RigConfig, out: Path, *, seed: int, saved: SavedTare | None, live: LiveLine, kind_folder: str
+    ) -> None:
         self._rig = rig
         self._out = out
         self._live = live
         self._loop = EventLoop()
         self.log = out / "run.mcap"
         self.notes: list[str] = []
-        self._processes = Processes(rig, seed=seed, saved=saved, log=self.log, on_spawn=self._listen)
+        self._processes = Processes(
+            rig, seed=seed, saved=saved, log=self.log, kind_folder=kind_folder, on_spawn=self._listen
+        )
         self._children = self._processes.children
         self._began = False
         self._stop_asked_ns = 0
@@ -92,9 +98,9 @@ class Launcher:
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
         """Return the counters of the three devices, as their drivers counted."""
         return {
-            "ft300": figures["ft"],
-            "ur10": {"packets": figures["arm_packets"]},
-            "ridgeback": self._said("gate").get("counters", {}),
+            name_of(self._rig.ft.kind): figures["ft"],
+            name_of(self._rig.arm.kind): {"packets": figures["arm_packets"]},
+            name_of(self._rig.base.kind): self._said("gate").get("counters", {}),
         }
 
     # --- start -----------------------------------------------------------------------------------------------
@@ -103,7 +109,7 @@ class Launcher:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)
         names = self._processes.start_the_rest(run_dir.write_config(self._out, self._rig))
         pids = {"schema": 1, "launcher": os.getpid(), **self._processes.pids}
-        run_dir.write_json(self._out / "processes.json", pids)
+        write_json(self._out / "processes.json", pids)
         self._wait_ready(names, READY_NS)
         self._tell_priorities()
         self._began = True
@@ -128,7 +134,7 @@ class Launcher:
             elif event.get("event") == "warning":
                 self._live.say(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
-                self._live.say(f"recorder: {event['what']}")
+                self._live.say(f"recorder: {event['error']['what']}")
                 self._processes.tell_control(b"L")
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
@@ -147,9 +153,9 @@ class Launcher:
                 deadline_ns = min(deadline_ns, monotonic_ns() + OTHERS_NS)
             # Control opens the sensor, the gate the base, the arm's process the arm: all three may still speak.
             if failed and (len(failed) == len(waiting) or monotonic_ns() > deadline_ns):
-                raise combined(failed)
+                raise combined(failed, self._rig)
             if monotonic_ns() > deadline_ns:
-                raise not_in_time(waiting)
+                raise not_in_time(waiting, self._rig)
             self._loop.run_once(20)
 
     def _failed(self, child: Child) -> bool:
@@ -220,7 +226,7 @@ class Launcher:
         for name in ("gate", "emulators", "arm", "recorder"):
             child = self._children.get(name)
             if child is not None and child.errors:
-                self.notes.append(f"{name}: {child.errors[-1].get('what', '')}")
+                self.notes.append(f"{name}: {child.errors[-1].what}")
             elif child is not None and child.process.returncode != 0:
                 self.notes.append(f"the {name} process {child.how_it_ended()}")
         said = self._said("recorder")

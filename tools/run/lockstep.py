@@ -11,23 +11,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from control.loop import ft_input
 from control.run_notes import RunNotes, outcome
-from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, VirtualClock
+from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
-from robot_io.messages import ArmRecord, BaseOdometry, BasePose, BaseRecord, BaseReport
+from robot_io.messages import ArmRecord
 from robot_io.rig.config import RigConfig
+from robot_io.rig.declared import FT300_FACTS
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
-from safety import gate
-from safety.gate import GateLimits, GateState
+from safety.gate_shell import GateShell
 from sim_backend.ridgeback.settings import ridgeback_settings
 from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
+from tools.kinds import is_shipped, name_of
 from tools.log.run_log import RunLog
 from tools.log.world_log import into
 from tools.places.saved_tare import SavedTare
@@ -69,20 +70,16 @@ class Lockstep:
         self._clock = VirtualClock(START_NS)
         self._period_ns = round(NS_PER_S / rig.loop.rate_hz)
         self.world = World(rig, seed, START_NS, into(push))
-        sensor, world = rig.world.sensor, rig.world
-        self._ft = SimFt300(
-            self.world, self._clock, rate_hz=sensor.rate_hz, phase=sensor.phase, latency_ms=sensor.latency_ms
-        )
+        world = rig.world
+        self._ft = simulated_sensor(rig, self.world, self._clock)
         self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_rate_hz, phase=world.arm_phase)
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
         )
         self._core = TickCore.of(rig, in_contact=saved is not None)
         self._state = first_state(saved)
-        self._gate_limits = GateLimits.of(self._core.safety)
-        self._gate = GateState()
+        self._gate = GateShell(self._core.safety.envelope, START_NS)
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
-        self._record = BaseRecord()
         self.notes = RunNotes()
         self.operator = Operator.NONE
 
@@ -101,8 +98,11 @@ class Lockstep:
             if output.finished or now_ns > MOST_SECONDS * NS_PER_S:
                 break
             tick += 1
-        counters = {"ft300": self._ft.health().counters, "ur10": {"packets": inp.arm.packets}}
-        counters["ridgeback"] = self._base.health().counters
+        counters = {
+            name_of(self.rig.ft.kind): self._ft.health().counters,
+            name_of(self.rig.arm.kind): {"packets": inp.arm.packets},
+            name_of(self.rig.base.kind): self._base.health().counters,
+        }
         for device in devices:
             device.stop()
             device.close()
@@ -123,9 +123,9 @@ class Lockstep:
             now_ns,
             int(operator),
             HostInput(0, 0, True, True, True, False, 0),
-            ft_input(readings, self._ft.health()),
+            ft_input(readings, self._ft.health(), 0),
             self._arm.read() or ArmRecord(),
-            self._record,
+            self._gate.record,
         )
         try:
             after, output = self._core.fold(self._state, inp)
@@ -144,42 +144,25 @@ class Lockstep:
         self.notes.note(inp, output)
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
-        """Pass the command through the gate's judgement, as the gate process does."""
-        frame = GateFrame(self._gate.seq + 1, tick, now_ns, output.mode, output.command_body)
-        self._gate = gate.on_clock(gate.on_frame(self._gate_limits, self._gate, frame, now_ns), now_ns)
-        wanted = gate.due(self._gate, now_ns)
+        """Pass the command through the gate, as its process does."""
+        frame = GateFrame(self._gate.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
+        self._gate = self._gate.on_frames((frame,), now_ns, now_ns).on_clock(now_ns, self._base.health())
+        self._gate, latching = self._gate.on_leaving(now_ns)
+        if latching is not None:
+            self._gate_log.latched(now_ns, *astuple(latching))
+        wanted = self._gate.due(now_ns)
         if wanted is not None:
             really = self._base.command(wanted)
-            self._gate = gate.sent(self._gate, wanted, now_ns)
-            self._record = replace(self._record, sent=really, sent_ns=now_ns)
+            self._gate = self._gate.on_sent(wanted, really, now_ns)
             self._gate_log.sent(now_ns, really)
 
     def _take_base(self, now_ns: int) -> None:
-        changes: dict[str, Any] = {}
-        pose_seq, odometry_seq = self._record.pose_seq, self._record.odometry_seq
-        for sample in self._base.drain():
-            value, at_ns = sample.value, sample.received_ns
-            changes["newest_inbound_ns"] = at_ns
+        samples = self._base.drain()
+        for sample in samples:
             self._gate_log.inbound(sample)
-            if isinstance(value, BasePose):
-                pose_seq += 1
-                changes.update(pose=value.pose, pose_valid=value.valid, pose_received_ns=at_ns)
-            elif isinstance(value, BaseOdometry):
-                odometry_seq += 1
-                changes.update(odometry=value.twist, odometry_received_ns=at_ns)
-                self._gate = gate.on_speed(self._gate_limits, self._gate, value.twist)
-            elif isinstance(value, BaseReport):
-                changes.update(status=value.status, status_received_ns=at_ns)
-        self._record = replace(
-            self._record,
-            **changes,
-            pose_seq=pose_seq,
-            odometry_seq=odometry_seq,
-            accepted_seq=self._gate.seq,
-            latched=self._gate.latch != gate.Latch.NONE,
-            latch_cause=int(self._gate.latch),
-            verdict=int(self._gate.latch),
-            published_ns=now_ns,
+        # Nothing is pinged here: there is no bridge that could answer.
+        self._gate = self._gate.on_samples(samples).on_publish(
+            now_ns, newest_inbound_ns=self._base.newest_inbound_ns, newest_pong_ns=0
         )
 
 
@@ -187,6 +170,18 @@ def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> Ru
     """Open the log of a lockstep run; its facts name nothing that differs from run to run."""
     facts = run_facts("sim", seed, in_contact=in_contact)
     return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
+
+
+def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:
+    """Return the sensor of level sim: an FT 300, or any other kind by what it declares."""
+    model, facts = rig.world.sensor, rig.ft.declared
+    if is_shipped("ft", rig.ft.kind):
+        return SimFt300(world, clock, rate_hz=model.rate_hz, phase=model.phase, latency_ms=model.latency_ms)
+    # Never exactly a multiple of the loop's rate, or every run would test one frozen phase.
+    rate_hz = facts.rate_hz * model.rate_hz / FT300_FACTS.rate_hz
+    return SimFt300(
+        world, clock, rate_hz=rate_hz, phase=model.phase, latency_ms=0, resolution=facts.resolution, limit=facts.range
+    )
 
 
 class WallPace:

@@ -19,7 +19,6 @@ import contextlib
 import os
 import platform
 import socket
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,32 +26,31 @@ import msgspec
 from msgspec.structs import replace
 
 from robot_io.clock import wall_offset_ns
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES
-from robot_io.ipc.base_record import BASE_RECORD_BYTES
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.spawn import Child, spawn
 from robot_io.rig.config import RigConfig, rig_to_toml
-from robot_io.ur10.driver import spawn_child
-from safety.gate import GateLimits
+from robot_io.ur10.driver import spawn_arm
+from robot_io.ur10.job import ArmJob
 from safety.gate_process import GateJob
 from safety.settings import SafetySettings
+from tools.kinds import is_shipped
 from tools.places.saved_tare import SavedTare
 from tools.rig import devices_at
-from tools.run.jobs import ControlJob, EmulatorJob
+from tools.run.jobs import ArmKindJob, ControlJob, EmulatorJob
 from tools.run.recorder import Job as RecorderJob
 from tools.run.recorder import RingSource
 from tools.run.run_facts import level_of, run_facts
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes of a recorder that does not drain."""
-DEVICE_NAMES = {"ft": "ft300", "arm": "ur10", "base": "ridgeback"}
 
 
 class Processes:
     """Starts the processes of one run, by `start_emulators` and `start_the_rest`; `children` has them by name.
 
-    saved: the tare of a run that starts in contact. log: where the recorder writes. on_spawn: called with each
+    saved: the tare of a run that starts in contact. log: where the recorder writes.
+    kind_folder: where else modules of the rig's kinds may be. on_spawn: called with each
     child as soon as it is there.
     """
 
@@ -63,12 +61,14 @@ class Processes:
         seed: int,
         saved: SavedTare | None,
         log: Path,
+        kind_folder: str,
         on_spawn: Callable[[Child], None],
     ) -> None:
         self._rig = rig
         self._seed = seed
         self._saved = saved
         self._log = log
+        self._kind_folder = kind_folder
         self._on_spawn = on_spawn
         self._offset_ns = wall_offset_ns()
         self._rings = {name: Ring.create(f"{name}-log", size) for name, size in RING_BYTES.items()}
@@ -83,11 +83,11 @@ class Processes:
 
     def start_emulators(self) -> list[str]:
         """Start the world and the wire servers of all devices at level emulated; return the name of the process."""
-        emulated = tuple(DEVICE_NAMES[device] for device in devices_at(self._rig, "emulated"))
+        emulated = tuple(devices_at(self._rig, "emulated"))
         if not emulated:
             return []
         ring_fd, alive_fd = self._rings["world"].fd, self._alive["world"][1]
-        job = EmulatorJob(rig_to_toml(self._rig), self._seed, emulated, os.getpid(), ring_fd, -1)
+        job = EmulatorJob(rig_to_toml(self._rig), self._kind_folder, self._seed, emulated, os.getpid(), ring_fd, -1)
         self._spawn("emulators", "tools.run.emulator_process", job, [ring_fd, alive_fd])
         return ["emulators"]
 
@@ -97,8 +97,8 @@ class Processes:
         config_text: the resolved rig, for the log.
         """
         rig = self._with_endpoints()
-        arm = SharedRecord.create("arm", ARM_RECORD_BYTES)
-        base = SharedRecord.create("base", BASE_RECORD_BYTES)
+        arm = TypedRecord.create("arm", ARM_RECORD)
+        base = TypedRecord.create("base", BASE_RECORD)
         control_end, gate_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         operator_read, self._operator_fd = os.pipe()
         os.set_blocking(self._operator_fd, False)
@@ -114,8 +114,8 @@ class Processes:
             os.close(write_end)
         for ring in self._rings.values():
             ring.close()
-        for record in (arm, base):
-            record.close()
+        arm.close()
+        base.close()
         return ["recorder", "gate", "arm", "control"]
 
     def tell_control(self, key: bytes) -> None:
@@ -142,13 +142,13 @@ class Processes:
         rig = self._rig
         emulators = self.children.get("emulators")
         ready = (emulators.ready if emulators else None) or {}
-        for found in ready.get("endpoints", []):
-            if found["device"] == "ft300":
-                rig = replace(rig, ft=replace(rig.ft, port=found["port"]))
-            elif found["device"] == "ur10":
-                rig = replace(rig, arm=replace(rig.arm, host=found["host"]))
-            else:
-                rig = replace(rig, base=replace(rig.base, url=found["url"]))
+        addresses = ready.get("addresses", {})
+        if "ft" in addresses:
+            rig = replace(rig, ft=replace(rig.ft, port=addresses["ft"]))
+        if "arm" in addresses:
+            rig = replace(rig, arm=replace(rig.arm, host=addresses["arm"]))
+        if "base" in addresses:
+            rig = replace(rig, base=replace(rig.base, url=addresses["base"]))
         return rig
 
     def _start_recorder(self, config_text: str) -> None:
@@ -160,25 +160,20 @@ class Processes:
         self._spawn("recorder", "tools.run.recorder", job, [*(ring.fd for ring in rings), *alive])
 
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
-        limits = GateLimits.of(SafetySettings.of(rig))
+        limits = SafetySettings.of(rig).envelope
         ring_fd = self._rings["gate"].fd
-        job = GateJob(rig.base, rig.frames, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns)
+        job = GateJob(
+            rig.base, rig.frames, self._kind_folder, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns
+        )
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
-        status = os.pipe()
-        stderr = tempfile.TemporaryFile(prefix="push-")  # noqa: SIM115 - the Child closes it
-        process = spawn_child(
-            rig.arm.host,
-            hold=rig.arm.hold,
-            record_fd=record_fd,
-            status_fd=status[1],
-            held_pose_rad=rig.arm.held_pose_rad,
-            held_pose_tolerance_rad=rig.arm.held_pose_tolerance_rad,
-            stderr=stderr,
-        )
-        os.close(status[1])
-        self._adopt(Child("arm", process, status[0], stderr))
+        if not is_shipped("arm", rig.arm.kind):
+            own = ArmKindJob(rig_to_toml(rig), self._kind_folder, os.getpid(), record_fd, -1)
+            self._spawn("arm", "tools.run.arm_process", own, [record_fd])
+            return
+        pose, tolerance_rad = rig.arm.held_pose_rad, rig.arm.held_pose_tolerance_rad
+        self._adopt(spawn_arm(ArmJob(rig.arm.host, rig.arm.hold, record_fd, os.getpid(), pose, tolerance_rad)))
 
     def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:
         ring_fd, alive_fd = self._rings["control"].fd, self._alive["control"][1]
@@ -186,7 +181,7 @@ class Processes:
         pidfds = [os.pidfd_open(self.children[name].pid) for name in ("gate", "arm", "recorder")]
         job = ControlJob(
             rig_to_toml(rig),
-            rig.ft.port,
+            self._kind_folder,
             self._saved,
             os.getpid(),
             gate_fd,

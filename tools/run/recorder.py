@@ -9,26 +9,25 @@
 that EOF means it is gone. The first is control's: its end is the end of the run. The others then have 1.5 s.
 
 It has no other way to be told to stop: SIGINT, SIGTERM and SIGHUP are ignored, because whoever sends them to a
-process group would cut the log. On `status_fd` it writes one JSON line each for "ready", "error" and "finished".
+process group would cut the log. On `status_fd` it says "ready", "error" and "finished" (`robot_io.ipc.status`).
 When the disk fails it says so, keeps draining, so that no producer notices, and counts what was lost; exit code 1.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from robot_io.clock import NS_PER_MS, monotonic_ns, wall_offset_ns
-from robot_io.errors import LogDamaged, PushError
+from robot_io.errors import EnvironmentFault, LogDamaged, PushError
 from robot_io.ipc.event_loop import HANGUP, READ, EventLoop
 from robot_io.ipc.ring import Ring
+from robot_io.ipc.status import StatusPipe
 from tools.log.run_log import RunLog
 
 POLL_NS = 20 * NS_PER_MS
@@ -61,12 +60,12 @@ class Job(msgspec.Struct, frozen=True):
 class Recorder:
     """Drains rings into one log until every producer is gone."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, status: StatusPipe) -> None:
         self._job = job
+        self._status = status
         self._rings = {source.name: Ring(source.fd) for source in job.rings}
         self._counts = dict.fromkeys(self._rings, 0)
         self._alive = set(job.alive_fds)
-        os.set_blocking(job.status_fd, False)  # a launcher that does not read must not stop the recording
         self._lost = 0
         self._disk_failed = False
         self._control_gone_ns: int | None = None
@@ -84,7 +83,7 @@ class Recorder:
             self._loop.add_fd(fd, partial(self._on_alive, fd), READ | HANGUP)
         self._loop.call_every(POLL_NS, self._on_poll)
         self._loop.call_every(FLUSH_NS, lambda _: self._flush())
-        self._say("ready", path=self._job.out_path)
+        self._status.say("ready", path=self._job.out_path)
         self._loop.run()
         until_ns = monotonic_ns() + FINAL_DRAIN_MAX_NS
         while self._drain() and monotonic_ns() < until_ns:  # what came while the last producer went
@@ -118,7 +117,7 @@ class Recorder:
             try:
                 records = ring.pop_all(_BATCH)
             except LogDamaged as damage:
-                self._error(damage.what, ring=name)
+                self._status.error(LogDamaged(damage.what, where=f"the ring of {name}"))
                 continue
             found = found or bool(records)
             self._counts[name] += len(records)
@@ -145,7 +144,8 @@ class Recorder:
     def _disk_error(self, error: OSError) -> None:
         self._disk_failed = True
         self._log.abandon()
-        self._error(f"the log cannot be written any more: {error.strerror}", path=self._job.out_path)
+        what = f"the log cannot be written any more: {error.strerror}"
+        self._status.error(EnvironmentFault(what, where=self._job.out_path, do="Make room on that disk"))
 
     def _finish(self) -> None:
         dropped = {name: ring.dropped for name, ring in self._rings.items()}
@@ -157,7 +157,7 @@ class Recorder:
                 self._log.finish(facts)
             except OSError as error:
                 self._disk_error(error)
-        self._say(
+        self._status.say(
             "finished",
             complete=not self._disk_failed,
             messages=self._log.messages,
@@ -168,30 +168,17 @@ class Recorder:
             undecodable=self._log.undecodable,
         )
 
-    def _error(self, what: str, **more: object) -> None:
-        self._say("error", what=what, **more)
-
-    def _say(self, event: str, **more: object) -> None:
-        say(self._job.status_fd, {"event": event, **more})
-
-
-def say(fd: int, value: dict[str, Any]) -> None:
-    """Write one JSON line; nobody listening is no reason to stop recording."""
-    try:
-        os.write(fd, json.dumps(value).encode() + b"\n")
-    except OSError:
-        return
-
 
 def main() -> int:
     """Read the job from stdin and record; return the exit code."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     job = msgspec.json.decode(sys.stdin.buffer.readline(), type=Job)
+    status = StatusPipe(job.status_fd)
     try:
-        recorder = Recorder(job)
+        recorder = Recorder(job, status)
     except PushError as error:
-        say(job.status_fd, {"event": "error", "what": error.what, "where": error.where, "do": error.do})
+        status.error(error)
         return error.exit_code
     return recorder.run()
 

@@ -1,18 +1,17 @@
-"""Facts of a run that go into its log: program, machine, level, seed."""
+"""Facts of a run that go into its log: code, machine, level, seed."""
 
 from __future__ import annotations
 
 import platform
 
 from robot_io.rig.config import RigConfig
+from tools.run.code_facts import code_facts
 
-PROGRAM_VERSION = "0.1.0"
 
-
-def program_and_machine() -> dict[str, str]:
-    """Return what can make a replay differ in the last bit: program, Python, C library, processor."""
+def code_and_machine() -> dict[str, str]:
+    """Return what can make a replay differ: format, program, packages, Python, C library, processor."""
     return {
-        "program": f"single-point-push {PROGRAM_VERSION}",
+        **code_facts(),
         "python": platform.python_version(),
         "libm": " ".join(platform.libc_ver()),
         "machine": platform.machine(),
@@ -20,9 +19,9 @@ def program_and_machine() -> dict[str, str]:
 
 
 def run_facts(level: str, seed: int, *, in_contact: bool) -> dict[str, str]:
-    """Return the facts of a run; none differs between two runs of the same program on the same machine."""
+    """Return the facts of a run; none differs between two runs of the same code on the same machine."""
     return {
-        **program_and_machine(),
+        **code_and_machine(),
         "level": level,
         "seed": str(seed),
         "in_contact": str(in_contact),

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from robot_io.errors import UsageError
+from tools.places.whole_file import check_writable, write_json, write_whole
 from tools.study.items import Part, Row
 
 STUDY_FILE = "study.json"
@@ -56,9 +57,7 @@ class Store:
             (out / "parts").mkdir(parents=True, exist_ok=True)
             if found is None:
                 self.write_json(STUDY_FILE, {"schema": 1, "study": name, "fingerprint": mark})
-            probe = out / ".writable"
-            probe.touch()
-            probe.unlink()
+            check_writable(out)
         except OSError as error:
             raise UsageError(
                 f"this folder cannot be written: {error.strerror}", where=str(out), do="Give another --out"
@@ -93,14 +92,11 @@ class Store:
 
     def write_json(self, name: str, value: object) -> None:
         """Write JSON for people and programs."""
-        self.write_bytes(name, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())
+        write_json(self.out / name, value)
 
     def write_bytes(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all."""
-        path = self.out / name
-        part = path.with_name(path.name + ".new")
-        part.write_bytes(content)
-        part.replace(path)
+        write_whole(self.out / name, content)
 
     def _read(self, index: int) -> Part | None:
         path = self.out / "parts" / f"{index:06d}.npz"

@@ -6,10 +6,9 @@ import socket
 import pytest
 
 from robot_io.clock import VirtualClock
-from robot_io.ipc.base_record import BASE_RECORD_BYTES, pack_base_record
 from robot_io.ipc.gate_frame import GateFrame, unpack_frame
 from robot_io.ipc.gate_link import GateLink
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import BASE_RECORD, TypedRecord
 from robot_io.messages import NO_BASE, BaseRecord, BaseStatus, BodyTwist, Pose2D
 
 TWIST = BodyTwist(0.1, 0.01, -0.02)
@@ -21,7 +20,7 @@ class Link:
     def __init__(self, clock=None):
         self.gate, mine = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.gate.setblocking(False)
-        self.record = SharedRecord.create("test-base", BASE_RECORD_BYTES)
+        self.record = TypedRecord.create("test-base", BASE_RECORD)
         self.base = GateLink(mine, os.dup(self.record.fd), *([clock] if clock else []))
 
     def close(self):
@@ -78,8 +77,8 @@ def test_the_record_is_the_newest_and_nobody_before_the_first(link):
         newest_inbound_ns=10, newest_pong_ns=11, accepted_seq=12, verdict=3, sent=TWIST, sent_ns=13, latched=True,
         latch_cause=11, published_ns=14,
     )  # fmt: skip
-    link.record.publish(pack_base_record(NO_BASE))
-    link.record.publish(pack_base_record(record))
+    link.record.publish(NO_BASE)
+    link.record.publish(record)
     assert link.base.read() == record
 
 

@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from robot_io.errors import DeviceUnreachable
-from robot_io.ipc.status import StatusPipe, StatusReader
+from robot_io.errors import DeviceUnreachable, EnvironmentFault, PushError
+from robot_io.ipc.status import StatusPipe, StatusReader, error_of
 
 
 @pytest.fixture
@@ -35,14 +35,23 @@ def test_lines_arrive_in_order(ends):
     assert listener.open
 
 
-def test_an_error_arrives_in_its_parts(ends):
+@pytest.mark.parametrize("kind", [DeviceUnreachable, EnvironmentFault, PushError])
+def test_an_error_arrives_as_what_it_was(ends, kind):
     speaker, listener, _ = ends
-    speaker.error(DeviceUnreachable("it is off", where="ft300", do="Switch it on"))
+    speaker.error(kind("it is off", where="ft300", do="Switch it on"))
     (event,) = listener.read()
     assert event["event"] == "error"
-    assert event["error"]["what"] == "it is off"
-    assert event["error"]["where"] == "ft300"
-    assert event["error"]["do"] == "Switch it on"
+    error = error_of(event)
+    assert type(error) is kind
+    assert (error.what, error.where, error.do) == ("it is off", "ft300", "Switch it on")
+
+
+@pytest.mark.parametrize(
+    "event",
+    [{}, {"kind": "DeviceError"}, {"kind": "annotations", "error": {}}, {"kind": 3, "error": {"what": 4}}],
+)
+def test_an_error_that_makes_no_sense_is_still_one(event):
+    assert isinstance(error_of(event), PushError)
 
 
 def test_a_full_pipe_does_not_block_and_the_rest_stays_readable(ends):

@@ -28,6 +28,10 @@ DIMENSIONLESS = {
     "base_from_sensor": "a rotation matrix",
     "base_from_marker": "m, m, rad: in the docstring",
     "bias": "N and N*m: in the docstring",
+    "range": "N and N*m: in the docstring",
+    "resolution": "N and N*m: in the docstring",
+    "noise": "N and N*m: in the docstring",
+    "options": "only the kind knows",
 }
 SUFFIXES = (
     *("_m", "_s", "_ms", "_N", "_Nm", "_rad", "_deg", "_hz", "_kg", "_m_per_s", "_rad_per_s"),

@@ -10,11 +10,10 @@ import time
 import pytest
 
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceProtocolError, DeviceUnreachable
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES
-from robot_io.ipc.record import SharedRecord
-from robot_io.messages import LinkState
-from robot_io.ur10.driver import ArmLink, Ur10, end_child, spawn_child
-from robot_io.ur10.job import parse_status
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
+from robot_io.messages import ArmState, LinkState
+from robot_io.ur10.driver import ArmLink, Ur10, spawn_arm
+from robot_io.ur10.job import ArmJob
 from tests.wire.ur_process import EmulatorProcess, fresh_address, wait_until
 
 HELD = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31)
@@ -55,9 +54,8 @@ def test_samples_carry_joints_modes_stamps_and_rising_numbers(arm) -> None:
     wait_until(ten, "ten samples")
     joints = samples[-1].value
     assert joints.position == HELD
-    assert (joints.robot_mode, joints.safety_mode, joints.safety_bits) == (7, 1, 1)
-    assert (joints.robot_status_bits, joints.runtime_state, joints.speed_scaling) == (1, 1, 1.0)
-    assert arm.read().joint_modes == (253,) * 6
+    assert joints.state == ArmState.HOLDING
+    assert joints.device_state == 0x0001_01_01_01_07  # safety bits; status, runtime, safety and robot mode
     for before, after in itertools.pairwise(samples):
         assert after.seq > before.seq
         assert after.received_ns > before.received_ns
@@ -94,7 +92,7 @@ def test_monitor_leaves_a_playing_program_alone(robot) -> None:
     robot.call("play_other_program")
     wait_until(lambda: robot.get("controller.runtime_state") == 2, "it plays")
     with Ur10(robot.host) as arm:
-        assert arm.read().joints.runtime_state == 2
+        assert arm.read().joints.state == ArmState.FOREIGN_PROGRAM
     assert robot.get("controller.runtime_state") == 2
 
 
@@ -230,45 +228,34 @@ def test_the_child_dies_with_its_parent(robot) -> None:
 
 
 def test_the_parts_as_the_launcher_uses_them(robot) -> None:
-    record = SharedRecord.create("arm", ARM_RECORD_BYTES)
-    listen_fd, status_fd = os.pipe()
-    child = spawn_child(robot.host, hold="monitor", record_fd=record.fd, status_fd=status_fd)
-    os.close(status_fd)
+    record = TypedRecord.create("arm", ARM_RECORD)
+    child = spawn_arm(ArmJob(robot.host, "monitor", record.fd, os.getpid()))
     link = ArmLink(os.dup(record.fd))
     try:
-        with os.fdopen(listen_fd, "rb") as status:
-            assert parse_status(status.readline()).info.where == robot.host
-            wait_until(lambda: link.read().packets > 12, "packets flow")
-            assert end_child(child) == 0
-            assert status.readline() == b"", "a clean end reports nothing"
+        assert child.wait_ready(10.0)
+        assert child.ready["info"]["where"] == robot.host
+        wait_until(lambda: link.read().packets > 12, "packets flow")
+        assert child.stop(5.0) == 0
+        assert child.hear() == [], "a clean end reports nothing"
+        assert not child.status.open
         assert link.read().link == LinkState.CLOSED
     finally:
-        end_child(child)
+        child.stop(0.0)
+        child.close()
         link.close()
         record.close()
 
 
-def test_a_child_with_no_status_descriptor_and_no_robot_just_ends() -> None:
-    record = SharedRecord.create("arm", ARM_RECORD_BYTES)
-    child = spawn_child(fresh_address(), hold="monitor", record_fd=record.fd)
+def test_without_a_robot_it_reports_why_and_ends() -> None:
+    record = TypedRecord.create("arm", ARM_RECORD)
+    host = fresh_address()
+    child = spawn_arm(ArmJob(host, "monitor", record.fd, os.getpid()))
     try:
-        assert child.wait(10) == 4
-        assert ArmLink(os.dup(record.fd)).read() is None
+        assert not child.wait_ready(10.0)
+        assert child.process.wait(10) == 4
+        assert [(type(error), error.where) for error in child.errors] == [(DeviceUnreachable, f"{host}:30004")]
+        assert record.read() is None
     finally:
-        end_child(child)
+        child.stop(0.0)
+        child.close()
         record.close()
-
-
-def test_a_status_line_that_makes_no_sense_is_a_device_error() -> None:
-    for line in (b"", b"{}\n", b'{"event": "error"}\n', b'{"event": "ready", "info": 3, "realtime": true}\n'):
-        with pytest.raises(DeviceError, match="reported"):
-            parse_status(line)
-
-
-def test_a_child_that_ignores_sigterm_is_killed() -> None:
-    code = "import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint(flush=True)\ntime.sleep(60)"
-    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
-    assert child.stdout is not None
-    child.stdout.readline()
-    assert end_child(child, within_s=0.1) == -signal.SIGKILL
-    child.stdout.close()

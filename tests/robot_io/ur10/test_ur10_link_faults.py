@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from robot_io.messages import ArmError, LinkState
+from robot_io.messages import ArmError, ArmState, LinkState
 from robot_io.ur10.driver import Ur10
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
@@ -141,19 +141,21 @@ def test_text_messages_do_not_matter(robot, arm) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "seen"),
+    ("fault", "state", "bits", "mask"),
     [
-        (("protective_stop",), {"safety_bits": 0x404, "safety_mode": 3, "robot_mode": 7}),
-        (("emergency_stop",), {"safety_bits": 0x4C0, "safety_mode": 7, "robot_mode": 3}),
-        (("safeguard_stop",), {"safety_bits": 0x410, "safety_mode": 5}),
-        (("power_off",), {"robot_mode": 3, "robot_status_bits": 0}),
-        (("teach_button", True), {"robot_status_bits": 5}),
-        (("play_other_program",), {"runtime_state": 2, "robot_status_bits": 3}),
+        # device_state: safety bits (2 bytes), then robot status, runtime, safety and robot mode
+        (("protective_stop",), ArmState.PROTECTIVE_STOP, 0x0404_00_00_03_07, 0xFFFF_00_00_FF_FF),
+        (("emergency_stop",), ArmState.EMERGENCY_STOP, 0x04C0_00_00_07_03, 0xFFFF_00_00_FF_FF),
+        (("safeguard_stop",), ArmState.PROTECTIVE_STOP, 0x0410_00_00_05_00, 0xFFFF_00_00_FF_00),
+        (("power_off",), ArmState.OFF, 0x0000_00_00_00_03, 0x0000_FF_00_00_FF),
+        (("teach_button", True), ArmState.MOVING, 0x0000_05_00_00_00, 0x0000_FF_00_00_00),
+        (("play_other_program",), ArmState.FOREIGN_PROGRAM, 0x0000_03_02_00_00, 0x0000_FF_FF_00_00),
     ],
 )
-def test_states_reach_the_record(robot, arm, fault, seen: dict[str, int]) -> None:
+def test_states_reach_the_record(robot, arm, fault, state: ArmState, bits: int, mask: int) -> None:
     robot.call(*fault)
-    wait_until(lambda: {name: getattr(arm.read().joints, name) for name in seen} == seen, f"the record shows {seen}")
+    wait_until(lambda: arm.read().joints.state == state, f"the record shows {state.name}")
+    assert arm.read().joints.device_state & mask == bits
 
 
 def test_drift_reaches_the_record_and_is_not_corrected(robot, arm) -> None:

@@ -7,10 +7,10 @@ import time
 import pytest
 
 from robot_io.errors import DeviceNotReady
-from robot_io.ipc.arm_record import ARM_RECORD_BYTES
-from robot_io.ipc.record import SharedRecord
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import ArmError, LinkState
-from robot_io.ur10.driver import Ur10, end_child, spawn_child
+from robot_io.ur10.driver import Ur10, spawn_arm
+from robot_io.ur10.job import ArmJob
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
 HELD = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31)
@@ -91,12 +91,13 @@ def test_told_to_end_while_it_begins_it_ends_its_script(robot, tmp_path, monkeyp
     """No watchdog is armed yet: a script left behind would play until somebody stops it at the pendant."""
     (tmp_path / "sitecustomize.py").write_text(SLOW_PREPARATION)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    record = SharedRecord.create("arm", ARM_RECORD_BYTES)
-    child = spawn_child(robot.host, hold="servo", record_fd=record.fd)
+    record = TypedRecord.create("arm", ARM_RECORD)
+    child = spawn_arm(ArmJob(robot.host, "servo", record.fd, os.getpid()))
     try:
         wait_until(lambda: robot.get("controller.runtime_state") == 2, "the script plays")
     finally:
-        code = end_child(child)
+        code = child.stop(5.0)
+        child.close()
         record.close()
     assert code == 0
     wait_until(lambda: robot.get("controller.runtime_state") == 1, "the script has ended")

@@ -10,7 +10,7 @@ from robot_io.clock import VirtualClock
 from robot_io.errors import DeviceNotReady, UsageError
 from robot_io.messages import LinkState
 from sim_backend.ft300.standalone import ConstantWrench, parse_wrench
-from sim_backend.sim.ft300 import SimFt300, quantised
+from sim_backend.sim.ft300 import SimFt300
 
 MS = 1_000_000
 
@@ -57,10 +57,28 @@ def test_a_real_rate_error_moves_the_phase():
     assert sensor.health().counters == {"packets_ok": 99, "overflow": 0}
 
 
+def first_reading(wrench, **declared):
+    class Constant:
+        def read_ft(self, _t_ns):
+            return wrench
+
+    clock = VirtualClock()
+    with SimFt300(Constant(), clock, **declared) as sensor:
+        clock.advance_to(100 * MS)
+        return sensor.drain()[0].value
+
+
 def test_values_are_counted_in_hundredths_and_thousandths_and_clipped():
-    wrench = quantised((12.344, -0.006, 400.0, 0.0004, -0.0006, -40.0))
+    wrench = first_reading((12.344, -0.006, 400.0, 0.0004, -0.0006, -40.0))
     assert (wrench.fx, wrench.fy, wrench.fz) == (12.34, -0.01, 327.67)
-    assert (wrench.mx, wrench.my, wrench.mz) == (0.0, -0.001, -32.768)
+    assert (wrench.mx, wrench.my, wrench.mz) == (0.0, -0.001, -32.767)
+
+
+def test_another_sensor_counts_in_its_own_steps_to_its_own_range():
+    declared = {"resolution": (0.5,) * 3 + (0.25,) * 3, "limit": (100.0,) * 3 + (10.0,) * 3}
+    wrench = first_reading((12.4, -12.2, 120.0, 0.4, -0.1, -40.0), **declared)
+    assert (wrench.fx, wrench.fy, wrench.fz) == (12.5, -12.0, 100.0)
+    assert (wrench.mx, wrench.my, wrench.mz) == (0.5, 0.0, -10.0)
 
 
 def test_lifecycle_and_bounds():

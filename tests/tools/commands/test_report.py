@@ -278,12 +278,15 @@ def test_settings_are_compared_with_the_shipped_rig_of_that_name():
     assert differences(load_rig("barrel"), "barrel") == []
 
 
-def test_the_log_of_another_version_or_program_is_refused(ran, tmp_path):
+def test_the_log_of_another_program_is_refused(ran, tmp_path):
     from robot_io.cdr.cdr_type import CdrType
     from robot_io.log.mcap_log import McapLog
     from robot_io.messages import Pose2D
 
-    for topic, what in (("/control/tick", "another version of this program"), ("/pose", "no log of a push")):
+    for topic, what in (
+        ("/control/tick", "Pose2D stands where a push_msgs/msg/ControlTick"),
+        ("/pose", "no log of a push"),
+    ):
         path = tmp_path / f"{topic[1:4]}.mcap"
         log = McapLog(path, config_text="x = 1" if topic == "/pose" else rig_to_toml(rig_of(ran[0])), metadata={})
         log.channel(topic, CdrType(Pose2D, "push_msgs/msg/Pose2D"))

@@ -14,6 +14,7 @@ from robot_io.rig.config import load_rig
 from tools.commands import run as run_command
 from tools.places import run_dir
 from tools.places.state_dir import RigLock, state_dir
+from tools.places.whole_file import write_json
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -122,7 +123,7 @@ def test_a_tare_that_cannot_be_kept_does_not_take_the_verdict_with_it(state, cap
 def test_a_json_file_that_cannot_be_written_leaves_no_part_of_it(tmp_path):
     (tmp_path / "summary.json").mkdir()
     with pytest.raises(OSError, match="directory"):
-        run_dir.write_json(tmp_path / "summary.json", {})
+        write_json(tmp_path / "summary.json", {})
     assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
 
 

@@ -49,6 +49,21 @@ def test_another_sensor_or_mounting_is_another_power_cycle(change):
         saved_tare.load(resolve_rig("sim", [change]))
 
 
+def test_a_sensor_of_another_kind_is_another_sensor(tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(
+        "from robot_io.driver import SensorFacts\nfrom robot_io.ft300.driver import Ft300\n"
+        "class Mine(Ft300):\n    Emulator = object\n",
+        encoding="utf-8",
+    )
+    monkeypatch.chdir(tmp_path)
+    mine = "ft.kind=mine:Mine"
+    saved_tare.save(resolve_rig("emulated", [mine]), BIAS, JOINTS)
+    assert saved_tare.load(resolve_rig("emulated", [mine])).bias == BIAS
+    for other in ([], [mine, "ft.options.gain=2"]):
+        with pytest.raises(UsageError):
+            saved_tare.load(resolve_rig("emulated", other))
+
+
 def test_a_real_sensor_is_known_by_its_port_and_this_boot():
     here = resolve_rig("thing")
     assert saved_tare.power_cycle(here) == saved_tare.power_cycle(resolve_rig("thing", ["control.k_f=0.1"]))

@@ -13,16 +13,20 @@ import time
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
-from robot_io.clock import SIM_EPOCH_NS
+from robot_io.clock import NS_PER_S, SIM_EPOCH_NS
 from robot_io.log.channels import CHANNELS, Kind
 from robot_io.log.mcap_read import read_log, read_summary
+from robot_io.log.messages import GATE_DECISION
 from robot_io.log.world_messages import STATE_CDR
-from robot_io.messages import BodyTwist
+from robot_io.messages import BaseOdometry, BodyTwist
+from robot_io.rig.config import rig_to_toml
 from robot_io.tick import TICK_CDR
+from sim_backend.sim.ridgeback import SimRidgeback
 from tests.replay.runs import PUSH, ROOT, push
 from tools.rig import resolve_rig
-from tools.run.lockstep import Lockstep, WallPace
+from tools.run.lockstep import Lockstep, WallPace, open_log
 from tools.run.tick_core import TickCore
 
 SHORT = ("run", "sim", "--fast", "--distance-m", "0.1", "--no-report")
@@ -132,6 +136,38 @@ def test_an_exception_in_a_tick_stops_the_base_and_is_named_in_the_log(monkeypat
     assert last.before == before.after
     assert one.notes.fault_counts == {"F68": 1}
     assert (sent[-2].x > 0.04, sent[-1].x, sent[-1].y) == (True, 0.0, 0.0)
+
+
+def test_a_latch_of_the_gate_is_in_the_log_and_the_run_replays(tmp_path, monkeypatch):
+    """As in a wall-clock run. Odometry of 0.2 m/s, three in a row, where 1.3 times 0.15 m/s is the most allowed."""
+    drain, began_ns = SimRidgeback.drain, []
+
+    def too_fast(self):
+        samples = list(drain(self))
+        for i, sample in enumerate(samples):
+            if isinstance(sample.value, BaseOdometry) and (began_ns or sample.value.twist.vx > 0.04):  # it pushes
+                began_ns.append(sample.received_ns)
+                samples[i] = replace(sample, value=BaseOdometry(BodyTwist(0.2, 0.0, 0.0)))
+        return tuple(samples)
+
+    monkeypatch.setattr(SimRidgeback, "drain", too_fast)
+    rig = resolve_rig("sim", ())
+    log = open_log(tmp_path / "run.mcap", rig_to_toml(rig), 0, in_contact=False)
+    ended = Lockstep(rig, 0, log).run(lambda *_: None)
+    log.finish({})
+    assert ended["exit_code"] == 5
+    found = list(read_log(tmp_path / "run.mcap"))
+    (decision,) = [m for m in found if m.topic == "/gate/decision"]
+    latch = GATE_DECISION.decode(decision.payload)
+    assert (latch.verdict, latch.latched, latch.text) == (10, True, "the base is faster than the envelope")
+    assert 0 <= decision.log_time_ns - SIM_EPOCH_NS + NS_PER_S - began_ns[2] < 10_000_000  # the tick that saw the third
+    events = [CHANNELS[Kind.SAFETY_EVENT].cdr_type.decode(m.payload) for m in found if m.topic == "/safety/event"]
+    assert [e.fault for e in events if e.text.startswith("gate: ")] == ["F35"]
+    sent = [CHANNELS[Kind.GATE_SENT].cdr_type.decode(m.payload).twist.linear.x for m in found if m.topic == "/gate/sent"
+            and m.log_time_ns >= decision.log_time_ns]  # fmt: skip
+    assert set(sent) == {0.0}
+    done = push("replay", tmp_path / "run.mcap", "--json", state=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_pacing_keeps_the_rate_and_never_bursts_after_a_pause(monkeypatch):

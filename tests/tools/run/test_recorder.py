@@ -302,7 +302,8 @@ def test_a_full_disk_is_said_once_draining_goes_on_and_the_start_can_be_recovere
     wait_for(fill)
     error = run.event()
     assert error["event"] == "error"
-    assert "cannot be written" in error["what"]
+    assert "cannot be written" in error["error"]["what"]
+    assert error["error"]["where"] == str(run.out)
     for _ in range(3):
         fill()
     wait_for(lambda: run.rings["control"].pop_all(0) == [] and ring_empty(run.rings["control"]))
@@ -352,7 +353,7 @@ def test_rubbish_in_a_ring_is_an_event_and_not_the_end(run):
     wait_for(lambda: ring_empty(gate))
     os.pwrite(gate.fd, (2**40).to_bytes(8, "little"), 0)
     error = run.event()
-    assert (error["event"], error["ring"]) == ("error", "gate")
+    assert (error["event"], error["error"]["where"]) == ("error", "the ring of gate")
     run.rings["control"].push(Kind.CONTROL_TICK, 0, b"\x00\x01\x00\x00 this is no tick")
     run.rings["control"].push(99, 0, b"")
     run.rings["control"].push(Kind.CONTROL_TICK, 10_000_000, tick_payload(1))
@@ -365,7 +366,7 @@ def test_an_existing_log_is_refused_in_one_sentence(tmp_path):
     (tmp_path / "run.mcap").write_bytes(b"precious")
     run = Run(tmp_path / "run.mcap")
     error = run.event()
-    assert (error["event"], error["where"]) == ("error", str(run.out))
+    assert (error["event"], error["error"]["where"]) == ("error", str(run.out))
     assert run.process.wait(10) == 2
     assert run.out.read_bytes() == b"precious"
     run.close()

@@ -9,9 +9,20 @@ import tempfile
 
 import pytest
 
-from robot_io.errors import ConfigError, DeviceError, EnvironmentFault, PushError
+from robot_io.errors import (
+    ConfigError,
+    DeviceError,
+    DeviceNotReady,
+    DeviceUnreachable,
+    EnvironmentFault,
+    PushError,
+    UsageError,
+)
 from robot_io.ipc.spawn import Child
+from robot_io.rig.config import load_rig
 from tools.terminal.start_errors import combined, not_in_time
+
+RIG = load_rig("emulated")
 
 
 @pytest.fixture
@@ -35,43 +46,50 @@ def child():
         found.close()
 
 
-def said(code, what, where="there", do="Do this"):
-    return {"code": code, "what": what, "where": where, "do": do}
+def said(kind, what, where="there", do="Do this"):
+    return kind(what, where=where, do=do)
 
 
 def test_one_failure_keeps_its_parts(child):
-    error = combined([child("gate", errors=[said(4, "it is off", "ws://a:1", "Switch it on")])])
+    error = combined([child("gate", errors=[said(DeviceNotReady, "it is off", "ws://a:1", "Switch it on")])], RIG)
     assert type(error) is DeviceError
     assert (error.what, error.where, error.do) == ("it is off", "ridgeback ws://a:1", "Switch it on")
 
 
 def test_a_place_that_names_the_device_is_not_named_twice(child):
-    error = combined([child("control", errors=[said(4, "no such port", "ft300 /dev/x")])])
+    error = combined([child("control", errors=[said(DeviceNotReady, "no such port", "ft300 /dev/x")])], RIG)
     assert error.where == "ft300 /dev/x"
 
 
 def test_several_are_named_in_one_order_each_with_what_to_do(child):
-    failed = [child(name, errors=[said(4, f"{name} fails")]) for name in ("gate", "arm", "control")]
-    error = combined(failed)
+    failed = [child(name, errors=[said(DeviceNotReady, f"{name} fails")]) for name in ("gate", "arm", "control")]
+    error = combined(failed, RIG)
     assert error.exit_code == 4
     assert error.what == "ft300 there: control fails; ur10 there: arm fails; ridgeback there: gate fails"
     assert error.do == "ft300: Do this; ur10: Do this; ridgeback: Do this"
 
 
-@pytest.mark.parametrize(("codes", "kind"), [([2, 2], ConfigError), ([3], EnvironmentFault), ([2, 4], DeviceError)])
-def test_the_exit_code_is_theirs(child, codes, kind):
-    failed = [child(name, errors=[said(code, "no")]) for name, code in zip(("arm", "gate"), codes, strict=False)]
-    assert type(combined(failed)) is kind
+@pytest.mark.parametrize(
+    ("kinds", "kind"),
+    [
+        ([UsageError, ConfigError], ConfigError),
+        ([EnvironmentFault], EnvironmentFault),
+        ([ConfigError, DeviceUnreachable], DeviceError),
+    ],
+)
+def test_the_exit_code_is_theirs(child, kinds, kind):
+    failed = [child(name, errors=[said(one, "no")]) for name, one in zip(("arm", "gate"), kinds, strict=False)]
+    assert type(combined(failed, RIG)) is kind
 
 
-def test_the_recorder_says_no_code_and_is_no_device(child):
-    error = combined([child("recorder", errors=[{"event": "error", "what": "the disk is full"}])])
+def test_the_recorder_is_no_device(child):
+    error = combined([child("recorder", errors=[EnvironmentFault("the disk is full")])], RIG)
     assert (error.exit_code, error.what, error.where) == (3, "the disk is full", "recorder")
 
 
 def test_a_crash_is_a_defect_whose_traceback_is_kept(child, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    error = combined([child("arm", "raise ValueError('planted')")])
+    error = combined([child("arm", "raise ValueError('planted')")], RIG)
     assert type(error) is PushError
     assert error.exit_code == 1
     assert error.what == "its process ended with code 1 (ValueError: planted)"
@@ -81,12 +99,12 @@ def test_a_crash_is_a_defect_whose_traceback_is_kept(child, tmp_path, monkeypatc
 
 
 def test_a_killed_process_names_the_signal(child):
-    error = combined([child("gate", "import os; os.kill(os.getpid(), 9)")])
+    error = combined([child("gate", "import os; os.kill(os.getpid(), 9)")], RIG)
     assert (error.what, error.do) == ("its process was killed by SIGKILL", "")
 
 
 def test_one_that_hangs_is_named(child):
     hanging = child("arm")
-    error = not_in_time([hanging])
+    error = not_in_time([hanging], RIG)
     assert error.exit_code == 4
     assert f"ur10 (process {hanging.pid})" in error.what

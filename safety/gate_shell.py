@@ -1,0 +1,168 @@
+"""The gate around its judgement, pure: what it takes in, sends, publishes and logs, and when it ends.
+
+The gate's process and level sim both keep one `GateShell`, hand it what arrived and what the clock says, and carry
+out what it answers; neither decides anything itself. In the order of one turn:
+
+    shell = shell.on_frames(frames, began_ns, now_ns)  # control's frames, before any silence is judged
+    shell = shell.on_samples(base.drain())
+    shell = shell.on_clock(now_ns, base.health())
+    shell, latching = shell.on_leaving(now_ns)         # log and publish `latching` unless None
+    wanted = shell.due(now_ns)                         # send it unless None, then tell `on_sent`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from robot_io.ipc.gate_frame import GateFrame
+from robot_io.messages import (
+    BaseFeed,
+    BaseOdometry,
+    BasePose,
+    BaseRecord,
+    BaseReport,
+    BodyTwist,
+    DeviceHealth,
+    LinkState,
+    Stamped,
+)
+from safety import gate
+from safety.envelope import EnvelopeLimits
+from safety.gate import GateState, Latch
+
+PUBLISH_NS = 10_000_000
+"""A record leaves at least this often, and whenever something changes."""
+LAST_ZEROS_NS = 500_000_000
+"""How long zeros go on after control's end, at most."""
+FIRST_EFFECT_NS = 120_000_000
+"""Odometry that arrived earlier than this after the last zeros began may be from before they took effect."""
+REST_M_PER_S = REST_RAD_PER_S = 0.005
+
+
+class Latching(msgspec.Struct, frozen=True, gc=False):
+    """A latch to be logged: the last good frame's sequence number and tick, the cause, and its words."""
+
+    seq: int
+    tick: int
+    latch: Latch
+    text: str
+    fault: str
+    """The row of the fault table, "" for the normal end."""
+
+
+class GateShell(msgspec.Struct, frozen=True, gc=False):
+    """All that the gate remembers. Every method returns the shell that follows; times are CLOCK_MONOTONIC ns."""
+
+    limits: EnvelopeLimits
+    ran_ns: int
+    """When something last could leave: a longer pause than the gate may make itself is seen by it."""
+    gate: GateState = GateState()
+    record: BaseRecord = BaseRecord()
+    """What control sees of base and gate."""
+    told: Latch = Latch.NONE
+    """The latch that has been logged."""
+    link_cause: str = ""
+    zeros_since_ns: int = 0
+    """When control was gone; 0 while it is there."""
+
+    def on_frames(self, frames: Sequence[GateFrame | None], began_ns: int, read_ns: int) -> GateShell:
+        """Judge the frames that waited (None: nonsense), oldest first, read from `began_ns` to `read_ns`.
+
+        A pause of the gate in between makes no frame old, and is no silence of control.
+        """
+        if not frames:
+            return self
+        state = gate.on_frames(self.limits, self.gate, frames, began_ns)
+        if not state.latch:
+            state = replace(state, frame_ns=read_ns)
+        record = replace(self.record, accepted_seq=state.seq, verdict=int(state.latch))
+        return replace(self, gate=state, record=record)
+
+    def on_control_gone(self, now_ns: int) -> GateShell:
+        """Latch because control's end of the socket is closed; the last zeros begin."""
+        return replace(self, gate=gate.on_eof(self.gate), zeros_since_ns=now_ns)
+
+    def on_samples(self, samples: Sequence[Stamped[BaseFeed]]) -> GateShell:
+        """Take what the base said, oldest first; three measured speeds in a row beyond the limits latch."""
+        state, changes = self.gate, dict[str, Any]()
+        pose_seq, odometry_seq = self.record.pose_seq, self.record.odometry_seq
+        for sample in samples:
+            value, at_ns = sample.value, sample.received_ns
+            if isinstance(value, BasePose):
+                pose_seq += 1
+                changes.update(pose=value.pose, pose_valid=value.valid, pose_received_ns=at_ns)
+            elif isinstance(value, BaseOdometry):
+                odometry_seq += 1
+                changes.update(odometry=value.twist, odometry_received_ns=at_ns)
+                state = gate.on_speed(self.limits, state, value.twist)
+            elif isinstance(value, BaseReport):
+                changes.update(status=value.status, status_received_ns=at_ns)
+            # The object's pose is logged and goes no further; the echo of our own commands is for the driver.
+        if not changes:
+            return self
+        record = replace(self.record, pose_seq=pose_seq, odometry_seq=odometry_seq, **changes)
+        return replace(self, gate=state, record=record)
+
+    def on_clock(self, now_ns: int, health: DeviceHealth) -> GateShell:
+        """Latch when control has been silent too long or the base's link is gone."""
+        state = gate.on_clock(self.gate, now_ns)
+        if health.state != LinkState.LOST:
+            return self if state is self.gate else replace(self, gate=state)
+        return replace(self, gate=gate.latched(state, Latch.LINK), link_cause=health.cause)
+
+    def on_leaving(self, now_ns: int) -> tuple[GateShell, Latching | None]:
+        """Judge the gate's own pause, and return the latch that is to be logged now, if there is a new one.
+
+        It stands where all ways out meet: whatever woke a frozen gate first, nothing leaves before this is judged.
+        """
+        state = gate.on_own_pause(self.gate, now_ns - self.ran_ns)
+        latch = state.latch
+        shell = replace(self, gate=state, ran_ns=now_ns, told=latch)
+        if latch == self.told:
+            return shell, None
+        cause = self.link_cause if latch == Latch.LINK else ""
+        text = ": ".join(filter(None, (gate.LATCH_TEXT[latch], cause)))
+        fault = "" if latch == Latch.EOF else gate.LATCH_FAULT.get(latch, "F36")
+        return shell, Latching(state.seq, state.tick, latch, text, fault)
+
+    def due(self, now_ns: int) -> BodyTwist | None:
+        """Return the command to send now, or None when nothing is due yet."""
+        return gate.due(self.gate, now_ns)
+
+    def on_sent(self, wanted: BodyTwist, really: BodyTwist | None, now_ns: int) -> GateShell:
+        """Note what was wanted and what really left (None: nothing, over a lost link)."""
+        record = self.record if really is None else replace(self.record, sent=really, sent_ns=now_ns)
+        return replace(self, gate=gate.sent(self.gate, wanted, now_ns), record=record)
+
+    def publish_due(self, now_ns: int) -> bool:
+        """Return whether a record must leave although nothing has changed."""
+        return now_ns - self.record.published_ns >= PUBLISH_NS
+
+    def on_publish(self, now_ns: int, *, newest_inbound_ns: int, newest_pong_ns: int) -> GateShell:
+        """Return the shell whose `record` is to be published now."""
+        latch = self.gate.latch
+        record = replace(
+            self.record,
+            newest_inbound_ns=newest_inbound_ns,
+            newest_pong_ns=newest_pong_ns,
+            latched=latch != Latch.NONE,
+            latch_cause=int(latch),
+            published_ns=now_ns,
+        )
+        return replace(self, record=record)
+
+    def ends(self, now_ns: int, link: LinkState) -> bool:
+        """Return whether control is gone and the base was told zero: for long enough, until it rests, or in vain."""
+        if not self.zeros_since_ns:
+            return False
+        return now_ns >= self.zeros_since_ns + LAST_ZEROS_NS or link == LinkState.LOST or self._at_rest()
+
+    def _at_rest(self) -> bool:
+        twist = self.record.odometry
+        fresh = self.record.odometry_received_ns > self.zeros_since_ns + FIRST_EFFECT_NS
+        still = abs(twist.vx) < REST_M_PER_S and abs(twist.vy) < REST_M_PER_S and abs(twist.omega) < REST_RAD_PER_S
+        return fresh and still

@@ -1,0 +1,141 @@
+"""Logs of earlier formats stay readable: kept logs, written by the program as it was, are read by the program of today.
+
+How each was made, and when, stands in `tests/golden/README.md`, with its numbers. None is ever made anew.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from tests.replay.runs import replayed
+from tools.cli import main
+
+LOGS = Path(__file__).resolve().parents[1] / "golden" / "logs"
+LARGEST = 700_000
+SAME_MACHINE, OTHER_MACHINE = (), ("--tolerance", "1e-9")
+"""Another libm may round otherwise; docs/logs.md names the option for that."""
+
+
+class Golden(NamedTuple):
+    """What was in a log when it was written."""
+
+    messages: int
+    ticks: int
+    states: int
+    """Of the simulated world."""
+    faults: tuple[str, ...] = ()
+    first_push_tick: int = 0
+    """First tick of mode PUSHING."""
+
+
+GOLDEN = {
+    "sim": Golden(13131, 969, 968, (), 121),
+    "emulated": Golden(11950, 850, 953, (), 100),
+    "sim-barrel-in-contact": Golden(10059, 741, 740, (), 21),
+    "sim-other-keys": Golden(11768, 867, 866, (), 71),
+    "sim-arm-drifts": Golden(6145, 453, 452, ("F20-hold", "F20-stop"), 71),
+}
+CUT_OFF = LOGS / "emulated-cut-off.mcap"
+SAVED = Golden(5014, 352, 427, (), 30)
+"""What could be saved of it when it was written."""
+
+
+def told(capsys: Any, *argv: object) -> dict[str, Any]:
+    """Run `push ... --json` here, which must succeed; return its object."""
+    capsys.readouterr()
+    code = main([*map(str, argv), "--json"])
+    out, err = capsys.readouterr()
+    assert code == 0, err
+    found: dict[str, Any] = json.loads(out.splitlines()[-1])
+    return found
+
+
+def cat(capsys: Any, log: Path, *topics: str) -> list[dict[str, Any]]:
+    """Return the messages that `push log cat` prints."""
+    capsys.readouterr()
+    assert main(["log", "cat", str(log), "--topics", *topics]) == 0
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def check_events(capsys: Any, log: Path, golden: Golden) -> None:
+    events = [line["message"] for line in cat(capsys, log, "/safety/event")]
+    assert tuple(event["fault"] for event in events if event["kind"] == "fault") == golden.faults
+    pushing = [event["tick"] for event in events if event["text"].endswith("-> PUSHING")]
+    assert pushing[0] == golden.first_push_tick
+
+
+def check_replay(capsys: Any, log: Path, golden: Golden, *, complete: bool) -> None:
+    for machine in (SAME_MACHINE, OTHER_MACHINE):
+        code, found = replayed(capsys, log, *machine)
+        if code != 7 or not found["machine_differences"]:
+            break
+    assert code == 0, found
+    assert (found["ticks"], found["identical"], found["gaps"]) == (golden.ticks, golden.ticks, 0)
+    assert (found["world"]["states"], found["world"]["identical"]) == (golden.states, golden.states)
+    assert found["complete"] == complete
+
+
+def test_all_kept_logs_are_read_here_and_are_small():
+    kept = {path.stem: path.stat().st_size for path in LOGS.iterdir()}
+    assert set(kept) == {*GOLDEN, CUT_OFF.stem}
+    assert max(kept.values()) < LARGEST
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_info_tells_what_is_in_it(name, capsys):
+    info = told(capsys, "log", "info", LOGS / f"{name}.mcap")
+    counts = {channel["topic"]: channel["messages"] for channel in info["channels"]}
+    assert info["messages"] == GOLDEN[name].messages
+    assert (counts["/control/tick"], counts["/world/state"]) == (GOLDEN[name].ticks, GOLDEN[name].states)
+    assert info["metadata"]["run"]["level"] == name.partition("-")[0]
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_cat_prints_its_messages(name, capsys):
+    log = LOGS / f"{name}.mcap"
+    assert len(cat(capsys, log, "/control/tick")) == GOLDEN[name].ticks
+    check_events(capsys, log, GOLDEN[name])
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_export_writes_its_tables(name, tmp_path, capsys):
+    files = told(capsys, "log", "export", LOGS / f"{name}.mcap", "--out", tmp_path / "tables")["files"]
+    assert sum(files.values()) == GOLDEN[name].messages
+    with (tmp_path / "tables" / "base_cmd_vel.csv").open(newline="") as file:
+        speeds = [float(row["twist.linear.x [m/s]"]) for row in csv.DictReader(file)]
+    assert len(speeds) == GOLDEN[name].ticks
+    assert 0.09 < max(speeds) <= 0.1 + 1e-9, "all push at 0.1 m/s"
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_report_makes_a_page_of_it(name, tmp_path, capsys):
+    page = Path(told(capsys, "report", LOGS / f"{name}.mcap", "--out", tmp_path)["report"])
+    text = page.read_text()
+    assert text.rstrip().endswith("</html>")
+    for fault in GOLDEN[name].faults:
+        assert fault in text
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_replay_verifies_every_tick_with_the_rig_s_keys_as_they_were_called_then(name, capsys):
+    """In two logs the tare's time and both limits of the arm's drift decide what happens: defaults would differ."""
+    check_replay(capsys, LOGS / f"{name}.mcap", GOLDEN[name], complete=True)
+
+
+def test_a_log_that_was_cut_off_is_recovered_and_read_as_the_others(tmp_path, capsys):
+    assert main(["replay", str(CUT_OFF)]) == 8
+    assert "push log recover" in capsys.readouterr().err
+    log = tmp_path / "saved.mcap"
+    assert told(capsys, "log", "recover", CUT_OFF, "--out", log)["messages"] == SAVED.messages
+    assert told(capsys, "log", "info", log)["messages"] == SAVED.messages
+    assert len(cat(capsys, log, "/control/tick")) == SAVED.ticks
+    check_events(capsys, log, SAVED)
+    files = told(capsys, "log", "export", log, "--out", tmp_path / "tables")["files"]
+    assert files["control_tick.csv"] == SAVED.ticks
+    assert Path(told(capsys, "report", log, "--out", tmp_path)["report"]).stat().st_size > 10_000
+    check_replay(capsys, log, SAVED, complete=False)

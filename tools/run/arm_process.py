@@ -1,0 +1,88 @@
+"""An arm of somebody else in a run: `python -m tools.run.arm_process` (job on stdin). Publishes one shared record.
+
+Its driver may block or crash without touching the loop, which only sees a record that grows old.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+
+import msgspec
+
+from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
+from robot_io.driver import Driver
+from robot_io.errors import DeviceUnreachable, PushError
+from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.record import ARM_RECORD, TypedRecord
+from robot_io.ipc.status import StatusPipe
+from robot_io.kinds import build_driver, started
+from robot_io.messages import ArmRecord, ArmState, JointState, LinkState
+from robot_io.rig.config import rig_from_toml
+from tools.run.jobs import ArmKindJob
+
+PRIORITY = 81
+PERIOD_NS = 4 * NS_PER_MS
+"""How often the driver is drained, and a record published."""
+
+
+def main() -> int:
+    """Serve until SIGTERM; the exit code is that of the error when the arm could not be opened."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=ArmKindJob)
+    die_with_parent(job.launcher_pid)
+    set_timer_slack_1ns()
+    status = StatusPipe(job.status_fd)
+    arm = rig_from_toml(job.rig_toml).arm
+    shared = {
+        "hold": arm.hold,
+        "held_pose_rad": arm.held_pose_rad,
+        "held_pose_tolerance_rad": arm.held_pose_tolerance_rad,
+    }
+    asked: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: asked.append(number))
+    try:
+        options = shared | arm.options
+        driver: Driver[JointState] = build_driver("arm", arm.kind, arm.host, options, folder=job.kind_folder)
+        info = started(driver, "arm", arm.kind)
+    except PushError as error:
+        status.error(error)
+        return error.exit_code
+    status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
+    lock_memory()
+    record = TypedRecord(job.record_fd, ARM_RECORD)
+    newest = ArmRecord(child_pid=os.getpid())
+    try:
+        while not asked:
+            newest = publish(driver, record, newest, servo=arm.hold == "servo")
+            if newest.link == LinkState.LOST:
+                lost = DeviceUnreachable(
+                    driver.health().cause or "its link is gone", where=arm.host, do="Look at the arm"
+                )
+                status.error(lost)
+                return lost.exit_code
+            time.sleep(PERIOD_NS / NS_PER_S)
+    finally:
+        driver.stop()
+        driver.close()
+    return 0
+
+
+def publish(driver: Driver[JointState], record: TypedRecord[ArmRecord], before: ArmRecord, *, servo: bool) -> ArmRecord:
+    """Publish the newest state of the driver, also when there is no new one; return it."""
+    samples, link, now_ns = driver.drain(), driver.health().state, monotonic_ns()
+    newest = before
+    if samples:
+        sample = samples[-1]
+        arrived = min(sample.received_ns, now_ns)  # a stamp from the future would never grow old
+        newest = msgspec.structs.replace(before, joints=sample.value, packets=sample.seq, changed_ns=arrived)
+    holds = servo and link == LinkState.UP and newest.joints.state == ArmState.HOLDING
+    newest = msgspec.structs.replace(newest, link=int(link), servo=holds, published_ns=now_ns)
+    record.publish(newest)
+    return newest
+
+
+if __name__ == "__main__":
+    sys.exit(main())
