@@ -6,7 +6,7 @@ SEED ?= $(shell date +%s)
 DEMO := runs/demo-$(shell date +%Y%m%d-%H%M%S)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all check clean runtime dev
+.PHONY: help demo test test-all check mutants clean runtime dev
 
 help: ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -28,8 +28,11 @@ check: dev ## ruff, mypy strict and the import contracts, no tests
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+mutants: dev ## change the code one place at a time and list what no test notices (SINCE=<commit>: changed lines only)
+	$(BIN)/python -m tools.dev.mutants $(if $(SINCE),--since $(SINCE))
+
 clean: ## remove the environment and all caches (runs/ stays)
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .mutants
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 dev: ## set up with everything that tests and studies need

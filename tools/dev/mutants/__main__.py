@@ -1,0 +1,125 @@
+"""`python -m tools.dev.mutants [--since COMMIT] [PATH ...]`: exit 0 when every mutant is noticed or listed, else 1.
+
+Exit 2: it could not be found out (tests that fail as they are, an unknown commit, an unreadable list).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+
+from tools.dev.mutants import choose, digests, reach
+from tools.dev.mutants.equivalents import BadList, read_equivalents
+from tools.dev.mutants.judge import Judge, Trial, Verdict
+from tools.dev.mutants.mutant import Mutant
+from tools.dev.mutants.pool import work
+from tools.dev.mutants.results import Results
+from tools.dev.mutants.session import run_tests
+from tools.dev.mutants.summary import NOTICED, Summary
+from tools.dev.mutants.targets import ROOT, SHELLS, WHOLE_TESTS
+from tools.dev.mutants.tree import Tree
+
+KEPT = ROOT / ".mutants"
+"""Results and measurements of earlier sessions; git ignores it, and it may be removed at any time."""
+LIST = ROOT / "tests" / "mutants_equivalent.toml"
+SHELL_WORKERS = 1
+"""Tests with processes and a wall clock get the machine for themselves."""
+SHELL_LIMIT_S = 600.0
+EVERY_S = 30.0
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Try the chosen mutants and print what no test notices; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="make mutants", description="Find changes of the code that no test notices.")
+    parser.add_argument("--since", metavar="COMMIT", help="only mutants on lines that changed since this commit")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes at work (default: cores)")
+    parser.add_argument("paths", nargs="*", metavar="PATH", help="only files whose path begins like this")
+    args = parser.parse_args(argv)
+    try:
+        listed = read_equivalents(LIST)
+        whole, shells = choose.whole_mutants(), choose.shell_mutants()
+        chosen_whole, chosen_shells = (_chosen(group, args.since, args.paths) for group in (whole, shells))
+        chosen_shells = choose.sample(chosen_shells)
+        results = Results(KEPT / "results.jsonl")
+        verdicts = _try_whole(chosen_whole, results, args.workers) | _try_shells(chosen_shells, results)
+    except (BadList, choose.NoSuchCommit, reach.TestsFail) as error:
+        print(f"mutants: {_SENTENCES[type(error)].format(error)}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("mutants: interrupted; what is known is kept, and the next run goes on from there", file=sys.stderr)
+        return 130
+    summary = Summary(verdicts, listed, whole + shells)
+    print("\n".join(summary.lines()))
+    return 0 if summary.clean else 1
+
+
+_SENTENCES: dict[type[Exception], str] = {
+    BadList: f"{LIST.relative_to(ROOT)} cannot be used: {{}}",
+    choose.NoSuchCommit: "git knows no commit {}; name one that `git log` shows",
+    reach.TestsFail: "fails without any mutant, so nothing can be said; fix it first: {}",
+}
+
+
+def _chosen(mutants: list[Mutant], since: str | None, paths: list[str]) -> list[Mutant]:
+    if since is not None:
+        mutants = choose.changed_since(mutants, since)
+    return [mutant for mutant in mutants if not paths or mutant.path.startswith(tuple(paths))]
+
+
+def _try_whole(mutants: list[Mutant], results: Results, workers: int) -> dict[Mutant, Verdict]:
+    files = digests.test_files(WHOLE_TESTS)
+    known = {mutant: results.verdict(mutant, files) for mutant in mutants}
+    open_ones = [mutant for mutant in mutants if known[mutant] is None]
+    if open_ones:
+        print(f"{len(open_ones)} of {len(mutants)} mutants to try; measuring which tests reach what", file=sys.stderr)
+        reached = reach.measure(KEPT, workers)
+        trials = [Trial(m, tests := reached.tests_for(m), {t: reached.seconds[t] for t in tests}) for m in open_ones]
+        known |= _judged(trials, results, dict.fromkeys(open_ones, files), workers)
+    return {mutant: verdict for mutant, verdict in known.items() if verdict is not None}
+
+
+def _try_shells(mutants: list[Mutant], results: Results) -> dict[Mutant, Verdict]:
+    tests = {shell.path: list(shell.tests) for shell in SHELLS}
+    files = {mutant: tests[mutant.path] for mutant in mutants}
+    known = {mutant: results.verdict(mutant, files[mutant]) for mutant in mutants}
+    open_ones = [mutant for mutant in mutants if known[mutant] is None]
+    if open_ones:
+        print(f"{len(open_ones)} of {len(mutants)} mutants of process shells to try", file=sys.stderr)
+        wanted = list(dict.fromkeys(file for mutant in open_ones for file in files[mutant]))
+        seconds = dict(work(wanted, _time_file, SHELL_WORKERS))
+        if failing := [file for file, took in seconds.items() if took is None]:
+            raise reach.TestsFail(", ".join(failing))
+        took = {file: s for file, s in seconds.items() if s is not None}
+        trials = [Trial(mutant, files[mutant], took) for mutant in open_ones]
+        known |= _judged(trials, results, files, SHELL_WORKERS)
+    return {mutant: verdict for mutant, verdict in known.items() if verdict is not None}
+
+
+def _time_file(tree: Tree, file: str) -> float | None:
+    """Return how long a test file takes as it is, s; None when it fails."""
+    begin = time.monotonic()
+    ended = run_tests(tree.root, [file], None, SHELL_LIMIT_S)
+    return time.monotonic() - begin if ended.passed else None
+
+
+def _judged(
+    trials: list[Trial], results: Results, files: dict[Mutant, list[str]], workers: int
+) -> dict[Mutant, Verdict]:
+    verdicts: dict[Mutant, Verdict] = {}
+    said_s = time.monotonic()
+    for trial, verdict in work(trials, Judge(), workers):
+        mutant = trial.mutant
+        results.add(mutant, verdict, files[mutant])
+        verdicts[mutant] = verdict
+        if verdict.outcome not in NOTICED:
+            print(f"{verdict.outcome}: {mutant.name}", file=sys.stderr, flush=True)
+        if time.monotonic() - said_s > EVERY_S:
+            said_s = time.monotonic()
+            print(f"{len(verdicts)} of {len(trials)} tried", file=sys.stderr, flush=True)
+    return verdicts
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,63 @@
+"""What is mutated and which tests must notice: the one table to update when files move."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+class Shell(NamedTuple):
+    """A module that lives in a process, and the test files that run it, fastest first."""
+
+    path: str
+    tests: tuple[str, ...]
+
+
+WHOLE = (
+    "control/*.py",
+    "safety/*.py",
+    "robot_io/geometry.py",
+    "robot_io/cdr/*.py",
+    "robot_io/ft300/codec.py",
+    "robot_io/ft300/modbus.py",
+    "robot_io/ipc/arm_record.py",
+    "robot_io/ipc/base_record.py",
+    "robot_io/ipc/gate_frame.py",
+    "robot_io/log/chain.py",
+    "robot_io/log/mcap_walk.py",
+    "robot_io/log/ros_messages.py",
+    "robot_io/log/seal.py",
+    "robot_io/ridgeback/rosbridge_codec.py",
+    "robot_io/ridgeback/rosbridge_messages.py",
+)
+"""Globs of the parts without a process: every mutant of them runs, but for the shells below that a glob also finds."""
+
+WHOLE_TESTS = ("tests/control", "tests/safety", "tests/robot_io", "tests/tools/log", "tests/wire")
+"""Measured once, so that a mutant only meets the tests that reach it."""
+
+_RUNS = ("tests/tools/commands/test_run_emulated.py",)
+SHELLS = (
+    Shell("safety/gate_process.py", ("tests/safety/test_gate_process.py", *_RUNS, "tests/faults/test_kills.py")),
+    Shell("control/loop.py", ("tests/control/test_loop.py", "tests/tools/run/test_lockstep.py", *_RUNS)),
+    Shell("tools/run/control_process.py", (*_RUNS, "tests/faults/test_kills.py")),
+    Shell("tools/run/launcher.py", (*_RUNS, "tests/faults/test_kills.py")),
+    Shell("tools/run/recorder.py", ("tests/tools/run/test_recorder.py", *_RUNS)),
+    Shell(
+        "robot_io/ur10/child.py", ("tests/robot_io/ur10/test_ur10_servo.py", "tests/robot_io/ur10/test_ur10_driver.py")
+    ),
+    Shell("tools/run/emulator_process.py", _RUNS),
+)
+SAMPLE = 200
+"""So many mutants of all shells together: each costs whole test files in which processes start."""
+SEED = "single-point-push"
+
+PRODUCT = ("robot_io", "control", "safety", "sim_backend", "tools")
+
+
+def whole_paths(root: Path = ROOT) -> list[str]:
+    """Return the paths of all parts that are mutated whole, relative to `root`, sorted."""
+    shells = {shell.path for shell in SHELLS}
+    found = {path.relative_to(root).as_posix() for glob in WHOLE for path in root.glob(glob)}
+    return sorted(found - shells)

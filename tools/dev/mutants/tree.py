@@ -1,0 +1,46 @@
+"""A copy of the checkout in which a file can be changed: whatever a test starts there sees the change."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+from tools.dev.mutants.targets import ROOT
+
+
+class Tree:
+    """One copy, used by one worker."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    @classmethod
+    def copy(cls, root: Path) -> Tree:
+        """Copy the checkout's files as they are now, those that git ignores left out, to the new folder `root`."""
+        command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+        listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+        for name in filter(None, listed.split("\0")):
+            if (ROOT / name).is_file():
+                (root / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(ROOT / name, root / name)
+        (root / ".venv").symlink_to(ROOT / ".venv")
+        return cls(root)
+
+    @contextlib.contextmanager
+    def changed(self, path: str, source: bytes) -> Iterator[None]:
+        """Give the file at `path` another content for a while.
+
+        Its byte code goes, for Python would trust an old one of the same second and size; the tests write none.
+        """
+        file = self.root / path
+        original = file.read_bytes()
+        for compiled in file.parent.glob(f"__pycache__/{file.stem}.*.pyc"):
+            compiled.unlink()
+        file.write_bytes(source)
+        try:
+            yield
+        finally:
+            file.write_bytes(original)
