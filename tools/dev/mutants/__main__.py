@@ -43,7 +43,8 @@ def main(argv: list[str] | None = None) -> int:
         chosen_whole, chosen_shells = (_chosen(group, args.since, args.paths) for group in (whole, shells))
         chosen_shells = choose.sample(chosen_shells)
         results = Results(KEPT / "results.jsonl")
-        verdicts = _try_whole(chosen_whole, results, args.workers) | _try_shells(chosen_shells, results)
+        verdicts = _try_whole(chosen_whole, results, args.workers)
+        failing = _try_shells(chosen_shells, results, verdicts)
     except (BadList, choose.NoSuchCommit, reach.TestsFail) as error:
         print(f"mutants: {_SENTENCES[type(error)].format(error)}", file=sys.stderr)
         return 2
@@ -52,6 +53,9 @@ def main(argv: list[str] | None = None) -> int:
         return 130
     summary = Summary(verdicts, listed, whole + shells)
     print("\n".join(summary.lines()))
+    if failing:
+        print(f"mutants: {_SENTENCES[reach.TestsFail].format(failing)}", file=sys.stderr)
+        return 2
     return 0 if summary.clean else 1
 
 
@@ -80,7 +84,8 @@ def _try_whole(mutants: list[Mutant], results: Results, workers: int) -> dict[Mu
     return {mutant: verdict for mutant, verdict in known.items() if verdict is not None}
 
 
-def _try_shells(mutants: list[Mutant], results: Results) -> dict[Mutant, Verdict]:
+def _try_shells(mutants: list[Mutant], results: Results, verdicts: dict[Mutant, Verdict]) -> str:
+    """Add the verdicts of the process shells; return the test files that fail without a mutant."""
     tests = {shell.path: list(shell.tests) for shell in SHELLS}
     files = {mutant: tests[mutant.path] for mutant in mutants}
     known = {mutant: results.verdict(mutant, files[mutant]) for mutant in mutants}
@@ -90,11 +95,12 @@ def _try_shells(mutants: list[Mutant], results: Results) -> dict[Mutant, Verdict
         wanted = list(dict.fromkeys(file for mutant in open_ones for file in files[mutant]))
         seconds = dict(work(wanted, _time_file, SHELL_WORKERS))
         if failing := [file for file, took in seconds.items() if took is None]:
-            raise reach.TestsFail(", ".join(failing))
+            return ", ".join(failing)
         took = {file: s for file, s in seconds.items() if s is not None}
         trials = [Trial(mutant, files[mutant], took) for mutant in open_ones]
         known |= _judged(trials, results, files, SHELL_WORKERS)
-    return {mutant: verdict for mutant, verdict in known.items() if verdict is not None}
+    verdicts |= {mutant: verdict for mutant, verdict in known.items() if verdict is not None}
+    return ""
 
 
 def _time_file(tree: Tree, file: str) -> float | None:
