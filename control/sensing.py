@@ -45,7 +45,7 @@ def sense(
 
 
 def in_contact(settings: Settings, state: ControlState) -> bool:
-    """Tell whether the filtered planar force is valid and at least the contact threshold."""
+    """Return whether the filtered planar force is valid and at least the contact threshold."""
     force = state.force_world
     return state.force_valid and math.hypot(force[0], force[1]) >= settings.control.force_min_N
 

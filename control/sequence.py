@@ -83,7 +83,7 @@ def _rested(state: ControlState, now_ns: int, for_ns: int) -> bool:
 
 
 def everyone_spoke(settings: Settings, state: ControlState, inp: TickInput) -> bool:
-    """Tell whether every device has given enough fresh data to start."""
+    """Return whether every device has given enough fresh data to start."""
     arm, base = inp.arm, inp.base
     return (
         inp.ft.packets_ok >= settings.settle_readings

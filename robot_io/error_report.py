@@ -34,17 +34,17 @@ def say_json(value: object) -> None:
 
 
 @contextlib.contextmanager
-def exit_code_matters_more() -> Iterator[None]:
+def ignoring_output_errors() -> Iterator[None]:
     """Lose what is printed on stdout in here when nobody takes it (a closed pipe or terminal, a full disk)."""
     try:
         yield
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError:
-        give_stdout_up()
+        discard_stdout()
 
 
-def give_stdout_up() -> None:
+def discard_stdout() -> None:
     """Send stdout nowhere: Python flushes it once more at exit, and would end with a code of its own."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
@@ -55,7 +55,7 @@ def report(error: PushError, *, as_json: bool) -> int:
     """Tell about `error` in one sentence, with `--json` also as the last line of stdout; return the exit code."""
     tell(printable(f"push: {error}"))
     if as_json:
-        with exit_code_matters_more():
+        with ignoring_output_errors():
             say_json({"schema": SCHEMA, "error": error.as_json()})
     return error.exit_code
 
@@ -73,4 +73,4 @@ def unexpected(error: BaseException) -> PushError:
         tell(trace)
         place = "the lines above"
     summary = " ".join(f"{type(error).__name__}: {error}".split())
-    return PushError(f"unexpected {summary}", do=f"This is a defect of the program; its traceback is in {place}")
+    return PushError(f"unexpected {summary}", do=f"This is a bug in the program; its traceback is in {place}")

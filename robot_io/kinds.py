@@ -101,7 +101,7 @@ def _blamed(kind: str, as_error: type[PushError], *, shipped: bool) -> Iterator[
         if shipped:  # then it is a defect of this program
             raise
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise as_error(f"its driver failed: {reason}", where=kind, do="Mend the driver") from error
+        raise as_error(f"its driver failed: {reason}", where=kind, do="Fix the driver") from error
 
 
 @contextlib.contextmanager

@@ -139,7 +139,7 @@ class BasePose(msgspec.Struct, frozen=True, gc=False, tag=True):
 
     @property
     def valid(self) -> bool:
-        """Whether the pose may be used."""
+        """Return whether the pose may be used."""
         return not self.flaw
 
 

@@ -23,7 +23,7 @@ class Phase(IntEnum):
     """Where the push is in its sequence."""
 
     SETTLE = 0
-    """Waiting until every device has spoken."""
+    """Waiting until every device has sent data."""
     TARE = 1
     """At rest, out of contact: measuring bias and tool weight."""
     APPROACH = 2

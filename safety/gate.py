@@ -54,12 +54,12 @@ LATCH_TEXT = {
     Latch.SILENCE: "control was silent for 50 ms",
     Latch.EOF: "control has ended",
     Latch.NONSENSE: "control sent something that is not a frame",
-    Latch.SEQUENCE: "a frame of control is missing or doubled",
+    Latch.SEQUENCE: "a frame of control is missing or duplicated",
     Latch.STALE: "control's frame was older than 50 ms",
     Latch.NOT_FINITE: "control sent a velocity that is not a number",
     Latch.ENVELOPE: "control sent a velocity beyond the envelope",
     Latch.STEP: "control's velocity jumped",
-    Latch.FROZEN_TICK: "control's tick stands still",
+    Latch.FROZEN_TICK: "control's tick counter has stopped",
     Latch.OVERSPEED: "the base is faster than the envelope",
     Latch.LINK: "the base link is gone",
     Latch.EOF_MOVING: "control died while the base was moving",
@@ -187,7 +187,7 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
 
 
 def _reduces(new: BodyTwist, old: BodyTwist) -> bool:
-    """Tell whether every component moves towards zero (or stays)."""
+    """Return whether every component moves towards zero (or stays)."""
     return all(
         abs(b) <= abs(a) and a * b >= 0.0 for a, b in ((old.vx, new.vx), (old.vy, new.vy), (old.omega, new.omega))
     )

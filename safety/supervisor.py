@@ -99,7 +99,7 @@ def _gather(
 
 
 def _pause(state: SafetyState, inp: TickInput) -> bool:
-    """Tell whether ticks were skipped just now; a loop that skips tick after tick has no pause to excuse it."""
+    """Return whether ticks were skipped just now; a loop that skips tick after tick has no pause to excuse it."""
     return inp.host.skipped > 0 and state.late_run == 1
 
 

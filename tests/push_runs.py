@@ -192,7 +192,7 @@ def world_of(log: Path) -> tuple[list[tuple[int, BodyTwist]], list[tuple[int, Bo
 
 
 def stands(twist: BodyTwist) -> bool:
-    """Tell whether a velocity is exactly zero."""
+    """Return whether a velocity is exactly zero."""
     return (twist.vx, twist.vy, twist.omega) == (0.0, 0.0, 0.0)
 
 

@@ -94,7 +94,7 @@ def make_venv(python: str, venv: Path) -> list[str]:
     if run(python, "-m", "venv", "--without-pip", str(venv)) and run(*outside, "--version"):
         return outside
     shutil.rmtree(venv, ignore_errors=True)
-    raise SetUpError(f"this Python can make no environment with pip: run `{APT_VENV}`, then try again")
+    raise SetUpError(f"this Python cannot make an environment with pip: run `{APT_VENV}`, then try again")
 
 
 def install(kind: str, pip: list[str], venv: Path) -> None:

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import NamedTuple, NoReturn
 
-from robot_io.error_report import exit_code_matters_more, give_stdout_up, report, unexpected
+from robot_io.error_report import discard_stdout, ignoring_output_errors, report, unexpected
 from robot_io.errors import EnvironmentFault, OperatorStop, PushError, UsageError
 
 BROKEN_PIPE = 141
@@ -39,7 +39,7 @@ COMMANDS = {
     ),
     "replay": Command(
         "tools.commands.replay",
-        "fold a log again and compare every bit",
+        "re-run a log's ticks and compare every byte",
         ("push replay runs/demo/run.mcap", "push replay runs/demo/run.mcap --json"),
     ),
     "report": Command(
@@ -49,7 +49,7 @@ COMMANDS = {
     ),
     "log": Command(
         "tools.commands.log",
-        "look into, export or recover a log",
+        "inspect, export or repair a log",
         ("push log info runs/demo/run.mcap", "push log recover runs/demo/run.mcap"),
     ),
     "sweep": Command(
@@ -60,7 +60,7 @@ COMMANDS = {
     "tune": Command("tools.commands.tune", "map of the gains over simulated pushes", ("push tune", "push tune --json")),
     "emulate": Command(
         "tools.commands.emulate",
-        "the wire emulators alone, until stopped",
+        "the wire emulators on their own, until stopped",
         ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate all --json"),
     ),
     "config": Command(
@@ -103,11 +103,11 @@ def main(argv: Sequence[str]) -> int:
         return report(OperatorStop("stopped by the operator"), as_json=as_json)
     except Exception as error:
         if isinstance(error, BrokenPipeError) and _reader_of_stdout_is_gone():
-            give_stdout_up()
+            discard_stdout()
             return BROKEN_PIPE
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:
             where = str(error.filename or "")  # none: where the output goes
-            with exit_code_matters_more():
+            with ignoring_output_errors():
                 return report(EnvironmentFault("there is no room left on the disk", where=where), as_json=as_json)
         return report(unexpected(error), as_json=as_json)
     return code

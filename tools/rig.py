@@ -59,7 +59,7 @@ def _with_kinds(rig: RigConfig, folder: str) -> tuple[RigConfig, list[str]]:
         if device in told and not told[device].emulated
     ]
     problems += [
-        f"`{own[device]}` cannot be simulated at level sim (a sensor of one's own can, arm and base cannot)"
+        f"`{own[device]}` cannot be simulated at level sim (a foreign sensor can, a foreign arm or base cannot)"
         for device in devices_at(rig, "sim")
         if device in told and device != "ft"
     ]
@@ -73,7 +73,7 @@ def devices_at(rig: RigConfig, level: str) -> list[str]:
 
 
 def is_rotation(rows: Matrix3) -> bool:
-    """Tell whether `rows` (3x3) is orthonormal with determinant +1, to 1e-6."""
+    """Return whether `rows` (3x3) is orthonormal with determinant +1, to 1e-6."""
     x, y, z = rows
     products = [(x, x, 1.0), (y, y, 1.0), (z, z, 1.0), (x, y, 0.0), (x, z, 0.0), (y, z, 0.0)]
     orthonormal = all(

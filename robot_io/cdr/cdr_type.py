@@ -45,7 +45,7 @@ class CdrType(Generic[MessageT]):
 
     @property
     def fixed_size(self) -> bool:
-        """Whether all payloads have one size: no strings, no sequences."""
+        """Return whether all payloads have one size: no strings, no sequences."""
         return self._layout.fixed
 
     def encode(self, value: MessageT) -> bytes:
@@ -64,7 +64,7 @@ class CdrType(Generic[MessageT]):
                 raise NotThisType("it does not start as little-endian CDR")
             value, end = self._layout.read(payload, HEADER_BYTES)
             if end != len(payload):
-                raise NotThisType(f"{len(payload) - end} bytes too many")
+                raise NotThisType(f"{len(payload) - end} bytes left over")
         except (NotThisType, struct.error, ValueError) as error:
             raise LogDamaged(
                 f"a payload of {len(payload)} bytes is not a {self.name}: {error}",

@@ -110,4 +110,4 @@ def _compiled(source: str, names: dict[str, Any]) -> Any:
 
 
 def _refuse(array: tuple[Any, ...], length: int) -> NoReturn:
-    raise ValueError(f"an array of {len(array)} where {length} belong")
+    raise ValueError(f"an array of {len(array)} elements instead of {length}")

@@ -48,7 +48,7 @@ class Layout:
             self._parts.append(_Run(run))
         self.min_bytes = sum(part.min_bytes for part in self._parts)
         self.fixed = all(isinstance(part, _Run) for part in self._parts)
-        """Whether all messages have one size, because none of its parts varies."""
+        """Return whether all messages have one size, because none of its parts varies."""
         self._shape = shape
         # Compiled at their first use: most types of a run are never read, most of a log never written.
         self._build: Build | None = None
@@ -206,7 +206,7 @@ class _Items(_Part):
         if self._count is None:
             _write_count(len(values), out)
         elif len(values) != self._count:
-            raise ValueError(f"an array of {len(values)} where {self._count} belong")
+            raise ValueError(f"an array of {len(values)} elements instead of {self._count}")
         for value in values:
             self._write_one(value, out)
 
@@ -294,5 +294,5 @@ def _read_text(payload: bytes, at: int) -> tuple[str, int]:
     size, at = _read_count(payload, at, 1)
     end = at + size
     if size == 0 or payload[end - 1] != 0:
-        raise NotThisType("a string without its end")
+        raise NotThisType("a string without its terminator")
     return payload[at : end - 1].decode(), end

@@ -45,7 +45,7 @@ class _Maker:
         if name in self._made:
             return self._made[name]
         if depth > _DEPTH_MAX:
-            raise ValueError("its types are nested too deep")
+            raise ValueError("its types are nested too deeply")
         fields: list[tuple[str, Any]] = []
         total = 0
         for line in self._definitions[name]:

@@ -189,7 +189,7 @@ def _shape_of_struct(annotation: Any, struct_type: type[msgspec.Struct]) -> Nest
         raise TypeError(f"{annotation!r}: tagged types have no ROS 2 form")
     for field in msgspec.structs.fields(annotation):
         if not _FIELD_NAME.match(_ros_field(field.name)):
-            raise TypeError(f"{struct_type.__name__}.{field.name} is no ROS 2 field name")
+            raise TypeError(f"{struct_type.__name__}.{field.name} is not a ROS 2 field name")
         try:
             fields.append((field.name, shape_of(field.type)))
         except TypeError as error:

@@ -175,7 +175,7 @@ class Ft300(DriverBase):
         try:
             self._line.set_wake_bytes(1)
             if not self._line.make_quiet(STOP_LIMIT_S):
-                self._cause = "it did not stop streaming when asked"
+                self._cause = "it did not stop streaming on request"
         except LINE_ERRORS as error:
             self._lose(error)
 

@@ -93,7 +93,7 @@ class Ft300Registers:
     def _stop_stream(self, limit_s: float) -> None:
         if not self._line.make_quiet(limit_s):
             raise DeviceProtocolError(
-                "it keeps sending and does not stop when asked",
+                "it keeps sending and does not stop on request",
                 where=self._where,
                 do=f"Check which device is on this port. {POWER_CYCLE}",
             )
@@ -105,7 +105,7 @@ class Ft300Registers:
         version = firmware_text(firmware)
         if not version.startswith("F"):
             raise DeviceProtocolError(
-                f"its firmware is {version!r}, and that of an FT 300 begins with F",
+                f"its firmware is {version!r}, but the firmware of an FT 300 begins with F",
                 where=self._where,
                 do="Check which device is on this port",
             )

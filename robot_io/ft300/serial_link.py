@@ -63,7 +63,7 @@ class SerialLine:
         self.port = port
         over_tcp = "://" in port
         if over_tcp and not is_tcp_address(port):
-            raise UsageError(f"{port!r} is no port of an FT 300", do="Give a device path or socket://host:port")
+            raise UsageError(f"{port!r} is not a port of an FT 300", do="Give a device path or socket://host:port")
         make = TcpPort if over_tcp else serial.Serial
         try:
             self.serial: _Port = make(

@@ -41,7 +41,7 @@ class Ring:
         self.fd = fd
         self.capacity = os.fstat(fd).st_size - _DATA
         if self.capacity < 8 or self.capacity % 8:
-            raise ValueError(f"descriptor {fd} is no ring: {self.capacity + _DATA} bytes")
+            raise ValueError(f"descriptor {fd} is not a ring: {self.capacity + _DATA} bytes")
         self._map = mmap.mmap(fd, _DATA + self.capacity)
         self._all = memoryview(self._map)
         self._counters = self._all[:_DATA].cast("Q")
@@ -92,7 +92,7 @@ class Ring:
                     break  # the good ones first; the next call comes here again
                 self._counters[_TAIL] = head
                 raise LogDamaged(
-                    "a log ring holds bytes that are no record; they are skipped", where=f"{self.capacity} byte ring"
+                    "a log ring holds bytes that are not a record; they are skipped", where=f"{self.capacity} byte ring"
                 )
             records.append(record)
             tail += _RECORD.size + len(record.payload) + (-len(record.payload) & 7)

@@ -18,7 +18,7 @@ from robot_io.errors import PushError
 from robot_io.ipc.process import fresh_interpreter
 from robot_io.ipc.status import StatusReader, error_of
 
-MOST_WORDS = 65_536
+MOST_STDERR_BYTES = 65_536
 """Bytes of a process's stderr that are looked at: its end."""
 
 
@@ -65,12 +65,12 @@ class Child:
             poll.poll(left_s * 1000)
         return self.ready is not None
 
-    def last_words(self) -> str:
+    def last_stderr_line(self) -> str:
         """Return the last line it wrote on stderr, "" when there is none."""
         lines = self._words().decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else ""
 
-    def keep_words(self) -> str:
+    def save_stderr(self) -> str:
         """Keep what it wrote on stderr (a traceback) in a file of its own; return the file's name."""
         with tempfile.NamedTemporaryFile(prefix=f"push-{self.name}-", suffix=".txt", delete=False) as file:
             file.write(self._words())
@@ -79,14 +79,14 @@ class Child:
     def _words(self) -> bytes:
         """Return the end of what it wrote on stderr; the file's position, which it shares with us, stays."""
         size = os.fstat(self._stderr.fileno()).st_size
-        return os.pread(self._stderr.fileno(), MOST_WORDS, max(0, size - MOST_WORDS))
+        return os.pread(self._stderr.fileno(), MOST_STDERR_BYTES, max(0, size - MOST_STDERR_BYTES))
 
     def how_it_ended(self) -> str:
         """Return how the process ended, in words."""
         code = self.process.returncode
         if code is not None and code < 0:
             return f"was killed by {signal.Signals(-code).name}"
-        words = self.last_words()
+        words = self.last_stderr_line()
         return f"ended with code {code}" + (f" ({words})" if words else "")
 
     def end(self, within_s: float) -> None:

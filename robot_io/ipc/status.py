@@ -62,7 +62,7 @@ def error_of(event: dict[str, Any]) -> PushError:
         kind = PushError
     parts = event.get("error")
     if not isinstance(parts, dict):
-        return kind(f"it reported {event!r}", do="This is a defect of the program")
+        return kind(f"it reported {event!r}", do="This is a bug in the program")
     return kind(str(parts.get("what", "")), where=str(parts.get("where", "")), do=str(parts.get("do", "")))
 
 

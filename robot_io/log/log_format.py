@@ -58,7 +58,7 @@ class ChangedTopic(NamedTuple):
 RENAMED_FIELDS: tuple[RenamedField, ...] = ()
 EARLIER_VALUES: tuple[EarlierValue, ...] = ()
 COMPUTED_VALUES = (ComputedValue("push_msgs/msg/ArmRecord", "joints.state", arm_state, 1),)
-CHANGED_TOPICS = (ChangedTopic("/diagnostics", 1),)
+CHANGED_TOPICS = (ChangedTopic("/diagnostics", 1), ChangedTopic("/safety/event", 1), ChangedTopic("/rosout", 1))
 
 
 def format_of(run_metadata: Mapping[str, str], where: str = "") -> int:
@@ -69,7 +69,7 @@ def format_of(run_metadata: Mapping[str, str], where: str = "") -> int:
     said = run_metadata.get(FORMAT_FACT, str(_FIRST_FORMAT))
     if not (said.isascii() and said.isdigit() and 0 < len(said) < 10 and int(said) >= _FIRST_FORMAT):
         raise LogDamaged(
-            f"its format is {said[:20]!r}, which is no number", where=where, do="Look at it with `push log info`"
+            f"its format is {said[:20]!r}, which is not a number", where=where, do="Look at it with `push log info`"
         )
     if int(said) > LOG_FORMAT:
         raise UsageError(

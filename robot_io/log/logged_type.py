@@ -38,7 +38,7 @@ class LoggedType(Generic[MessageT]):
         self.gone: frozenset[str] = frozenset()
         """Those of the log that today's type does not have."""
         if name != today.name:
-            raise LogDamaged(f"a {name[:100]} stands where a {today.name} belongs")
+            raise LogDamaged(f"a {name[:100]} where a {today.name} is expected")
         if text == today.schema_text:
             return
         self._logged = type_from_schema(name, text)
@@ -48,7 +48,7 @@ class LoggedType(Generic[MessageT]):
 
     @property
     def exact(self) -> bool:
-        """Whether the log's messages are today's, byte for byte."""
+        """Return whether the log's messages are today's, byte for byte."""
         return self._logged is None
 
     def decode(self, payload: bytes) -> MessageT:

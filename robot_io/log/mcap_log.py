@@ -55,7 +55,7 @@ class McapLog:
     def channel(self, topic: str, cdr_type: CdrType[Any], *, latched: bool = False) -> None:
         """Declare a topic, once, before its first message; `latched` topics are offered to late subscribers."""
         if topic in self._channels:
-            raise ValueError(f"{topic} is declared already")
+            raise ValueError(f"{topic} is already declared")
         if cdr_type.name not in self._schemas:
             text = cdr_type.schema_text.encode()
             self._schemas[cdr_type.name] = self._writer.register_schema(cdr_type.name, SCHEMA_ENCODING, text)

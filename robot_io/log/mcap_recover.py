@@ -45,7 +45,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
         except LogDamaged as damage:
             cause = damage.what
         if not cause:
-            raise UsageError("the log is whole, there is nothing to recover", where=str(path))
+            raise UsageError("the log is intact; there is nothing to recover", where=str(path))
         if copy.seal.messages == 0:
             raise LogDamaged(f"no message can be saved: {cause}", where=str(path))
         copy.writer.flush()

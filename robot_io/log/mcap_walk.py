@@ -68,7 +68,7 @@ def walk(path: Path, *, finished: bool = True, grown: Grown | None = None) -> It
     with file, _damage_named(path):
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MAGIC)) != MAGIC:
-            raise LogDamaged("this is no MCAP file", where=str(path), do="Give a log written by `push run`")
+            raise LogDamaged("this is not an MCAP file", where=str(path), do="Give a log written by `push run`")
         if finished and grown is None:
             file.seek(max(0, size - len(MAGIC)))
             if size < 2 * len(MAGIC) or file.read(len(MAGIC)) != MAGIC:
@@ -145,7 +145,7 @@ class _Walk:
             opcode, length = _HEAD.unpack_from(data, at)
             at += _HEAD.size
             if length > len(data) - at:
-                raise _altered(self._path, "a record reaches beyond its chunk")
+                raise _altered(self._path, "a record extends beyond its chunk")
             if opcode == _MESSAGE_OPCODE:
                 yield self._message(data, at, length)
                 at += length
@@ -159,7 +159,7 @@ class _Walk:
 
     def _message(self, data: bytes, at: int, length: int) -> Message:
         if length < _MESSAGE.size:
-            raise _altered(self._path, "a message is shorter than its head")
+            raise _altered(self._path, "a message is shorter than its header")
         channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, at)
         if channel_id not in self._channels:
             raise _altered(self._path, f"a message of channel {channel_id}, which is not declared")
@@ -229,7 +229,7 @@ def _truncated(path: Path) -> LogDamaged:
     return LogDamaged(
         "the log is truncated (its recorder was killed, the disk was full, or the run still goes on)",
         where=str(path),
-        do=f"When the run is over, `push log recover {path}` writes a whole log of what is there",
+        do=f"When the run is over, `push log recover {path}` repairs what is there",
     )
 
 
@@ -237,5 +237,5 @@ def _altered(path: Path, why: str) -> LogDamaged:
     return LogDamaged(
         f"the log is damaged: {why}",
         where=str(path),
-        do=f"Take another copy of it; `push log recover {path}` keeps what stands before the damage",
+        do=f"Take another copy of it; `push log recover {path}` keeps what comes before the damage",
     )

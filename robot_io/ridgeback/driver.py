@@ -262,7 +262,7 @@ class Ridgeback(DriverBase):
         if now_ns - self.newest_inbound_ns > LINK_STALE_NS:
             self._give_up(f"no message from the bridge for {LINK_STALE_NS / NS_PER_S:g} s")
         elif self._unheard_ns and now_ns - self._unheard_ns > LINK_STALE_NS:  # they wait somewhere, or are thrown away
-            self._give_up(f"the bridge gave back none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
+            self._give_up(f"the bridge echoed none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
         elif now_ns - self._last_ping_ns >= PING_PERIOD_NS:
             self._last_ping_ns = now_ns
             self._counters["pings"] += 1

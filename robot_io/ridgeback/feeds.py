@@ -57,7 +57,7 @@ def feed_types(topics: TopicsConfig, pose_source: str) -> dict[str, str]:
             raise ConfigError(
                 f"{topic}: messages of type {type_name} cannot be used here",
                 where="base.topics",
-                do=f"This program understands {wanted}",
+                do=f"This program accepts {wanted}",
             )
     types = {
         pose_topic: pose_type,

@@ -56,7 +56,7 @@ def check_topics(
                 unanswered.append(answer.call_id)
     if listeners is not None and not [node for node in listeners if "rosbridge" not in node]:
         raise DeviceNotReady(
-            f"nobody listens to the command topic {command_topic}",
+            f"nothing subscribes to the command topic {command_topic}",
             where=where,
             do="Start the base's software (twist_mux and the wheel controller), or correct base.topics.command",
         )

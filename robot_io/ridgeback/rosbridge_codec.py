@@ -47,7 +47,7 @@ def spell_type(type_name: str, ros_version: int) -> str:
 
 
 def type_fits(ours: str, reported: str) -> bool:
-    """Tell whether a bridge that reports a topic as `reported` takes `ours` (ROS 2 resolves the short form)."""
+    """Return whether a bridge that reports a topic as `reported` takes `ours` (ROS 2 resolves the short form)."""
     return reported in (ours, spell_type(ours, 2))
 
 

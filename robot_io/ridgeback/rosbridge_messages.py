@@ -40,7 +40,7 @@ class OdometryReading(msgspec.Struct, frozen=True, gc=False):
 
 
 def is_stamped(type_name: str) -> bool:
-    """Tell whether a command type wraps the twist in a header (geometry_msgs/TwistStamped, either ROS)."""
+    """Return whether a command type wraps the twist in a header (geometry_msgs/TwistStamped, either ROS)."""
     return type_name.rpartition("/")[2] == "TwistStamped"
 
 
@@ -202,6 +202,6 @@ def _reading(header: _Header, child: str, position: _Vector, q: _Quaternion) -> 
     if not (math.isfinite(x) and math.isfinite(y) and all(map(math.isfinite, parts))):
         flaw = "a number of the pose is null"
     elif yaw is None:
-        flaw = "the rotation is no upright unit quaternion"
+        flaw = "the rotation is not an upright unit quaternion"
     pose = Pose2D(x, y, _NAN if yaw is None else yaw)
     return PoseReading(pose, flaw, header.frame_id, child, _seconds(header))

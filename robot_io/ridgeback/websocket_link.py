@@ -45,7 +45,7 @@ def parse_url(url: str) -> WebSocketURI:
         uri.host.encode("idna")  # as looking it up does
     except (InvalidURI, ValueError) as error:
         raise ConfigError(
-            f"{url!r} is no websocket address", where="base url", do="Write it as ws://192.168.131.1:9090"
+            f"{url!r} is not a websocket address", where="base url", do="Write it as ws://192.168.131.1:9090"
         ) from error
     if uri.secure:
         raise ConfigError("encrypted websockets (wss) are not supported", where=url, do="Use ws://")
@@ -160,7 +160,7 @@ class WebSocketLink:
                     raise DeviceUnreachable(
                         f"accepts connections but gave no websocket handshake within {HANDSHAKE_TIMEOUT_S:g} s",
                         where=url,
-                        do="The bridge hangs, or something else listens there; restart rosbridge",
+                        do="The bridge hangs, or something else is listening there; restart rosbridge",
                     )
                 data = self._socket.recv(_RECEIVE_BYTES)
                 if data:
@@ -231,14 +231,14 @@ class WebSocketLink:
         try:
             sent = self._socket.send(data)
         except BlockingIOError as error:
-            raise LinkLost("the socket takes no more data: the bridge does not read") from error
+            raise LinkLost("the socket accepts no more data: the bridge is not reading") from error
         except OSError as error:
             raise LinkLost(f"sending failed ({error.strerror or error})") from error
         if sent != len(data):
-            raise LinkLost("only part of a message could be sent: the bridge does not read")
+            raise LinkLost("only part of a message could be sent: the bridge is not reading")
 
 
 def _not_a_bridge(url: str, error: Exception) -> DeviceError:
     detail = str(error) if isinstance(error, InvalidHandshake) and not isinstance(error, InvalidMessage) else ""
-    what = "what listens there is no websocket server" + (f" ({detail})" if detail else "")
+    what = "what listens there is not a websocket server" + (f" ({detail})" if detail else "")
     return DeviceProtocolError(what, where=url, do="Check the port; rosbridge listens on 9090 by default")

@@ -31,7 +31,7 @@ def parse(text: str, name: str) -> tuple[dict[str, Any], Origins]:
     if len(text) > _MOST_CHARACTERS:
         raise ConfigError(f"{len(text)} characters are too many for a rig", where=name)
     if any(piece.count(".") > _MOST_DOTS for piece in _BETWEEN_KEYS.split(text)):
-        raise ConfigError("this is nested too deep to be a rig", where=name)
+        raise ConfigError("this is nested too deeply to be a rig", where=name)
     try:
         data = tomllib.loads(text)
     except ValueError as error:  # a TOMLDecodeError, or an integer of thousands of digits
@@ -39,9 +39,9 @@ def parse(text: str, name: str) -> tuple[dict[str, Any], Origins]:
         place = re.search(r" \(at line (\d+), column \d+\)$", str(error))
         line = int(place[1]) if place else text.count("\n") + 1
         what = str(error)[: place.start()] if place else str(error)
-        raise ConfigError(f"this is not TOML: {what}", where=f"{name}:{line}", do="Mend that line") from None
+        raise ConfigError(f"this is not TOML: {what}", where=f"{name}:{line}", do="Fix that line") from None
     except RecursionError:
-        raise ConfigError("this is nested too deep to be a rig", where=name) from None
+        raise ConfigError("this is nested too deeply to be a rig", where=name) from None
     return data, _origins(text, name)
 
 

@@ -41,7 +41,7 @@ FATAL = (ArmError.LINK_LOST, ArmError.TIME_WENT_BACK)
 
 _CAUSE = {
     ArmError.LINK_LOST: "the RTDE connection is gone",
-    ArmError.TIME_WENT_BACK: "the controller's clock went back: it was restarted",
+    ArmError.TIME_WENT_BACK: "the controller's clock jumped back: it was restarted",
     ArmError.NOT_FINITE: "the controller reports joints that are not numbers",
     ArmError.SERVO_STOPPED: "the control script no longer runs",
     ArmError.SERVO_NOT_HOLDING: "the joints left the held target",

@@ -181,7 +181,7 @@ class _Connection:
         try:
             data = self._socket.recv(4096)
         except TimeoutError as error:
-            raise self._silent(f"it accepts the connection and says nothing for {STEP_TIMEOUT_S:g} s") from error
+            raise self._silent(f"it accepts the connection and sends nothing for {STEP_TIMEOUT_S:g} s") from error
         except OSError as error:
             raise self._silent(f"the connection broke ({_reason(error)})") from error
         if not data:

@@ -118,7 +118,7 @@ class ArmReader:
 
 
 def _same(a_s: float, b_s: float) -> bool:
-    """Whether two time stamps are equal, NaN to NaN as well: a stamp that stays NaN must not look like news."""
+    """Return whether two time stamps are equal, NaN to NaN as well: a stamp that stays NaN must not look like news."""
     return a_s == b_s or (math.isnan(a_s) and math.isnan(b_s))
 
 

@@ -129,7 +129,7 @@ def _check_may_start(host: str, reader: ArmReader, held_pose_rad: Joints | None,
     start = reader.wait_flowing()
     if reader.modes.runtime_state != RUNTIME_STOPPED or is_program_running(host):
         raise DeviceNotReady(
-            "a program is playing on the controller, and holding actively would end it",
+            "a program is running on the controller, and active holding would end it",
             where=host,
             do="Stop the program at the teach pendant, or use hold = monitor",
         )
@@ -168,6 +168,6 @@ def _wait_playing(host: str, reader: ArmReader) -> None:
     deadline_ns = monotonic_ns() + SCRIPT_START_NS
     while reader.joints is None or reader.modes.runtime_state != RUNTIME_PLAYING:
         if monotonic_ns() > deadline_ns:
-            raise DeviceNotReady("the control script is not playing", where=host, do="Try again")
+            raise DeviceNotReady("the control script is not running", where=host, do="Try again")
         time.sleep(0.002)
         reader.poll(monotonic_ns())

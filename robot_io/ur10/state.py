@@ -38,7 +38,7 @@ class UrModes(NamedTuple):
 
     @property
     def playing(self) -> bool:
-        """Whether a program runs on a robot that is running and not stopped by safety."""
+        """Return whether a program runs on a robot that is running and not stopped by safety."""
         allowed = self.safety_mode in (SAFETY_NORMAL, SAFETY_REDUCED)
         return self.runtime_state == RUNTIME_PLAYING and self.robot_mode == ROBOT_RUNNING and allowed
 

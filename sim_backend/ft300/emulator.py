@@ -88,7 +88,7 @@ class Ft300Emulator:
 
     @property
     def streaming(self) -> bool:
-        """Whether the sensor is in stream mode."""
+        """Return whether the sensor is in stream mode."""
         return self._streaming
 
     def start(self) -> None:

@@ -55,13 +55,13 @@ class PtyPort:
         """Create the pty and its link. Raises EnvironmentFault: no pty to be had, or something at the link's place."""
         if self._link is not None and self._link.exists() and not self._link.is_symlink():
             raise EnvironmentFault(
-                "something that is no link is in the way", where=str(self._link), do="Choose another name"
+                "something that is not a link is in the way", where=str(self._link), do="Choose another name"
             )
         try:
             self._master, slave = os.openpty()
         except OSError as error:
             raise EnvironmentFault(
-                f"this machine gives no pseudo-terminal ({error})",
+                f"this machine provides no pseudo-terminal ({error})",
                 where="/dev/pts",
                 do="Mount devpts there, or close some terminals",
             ) from error

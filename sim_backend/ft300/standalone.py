@@ -29,7 +29,9 @@ class ConstantWrench:
             raise UsageError("a step needs both its time and its wrench", do="Give --step-after-s and --step-wrench")
         step_ns = math.inf if step_after_s is None else step_after_s * NS_PER_S
         if step_after_s is not None and not 0.0 <= step_ns < math.inf:
-            raise UsageError(f"a step after {step_after_s} s cannot be", do="Give seconds from the start, 0 or more")
+            raise UsageError(
+                f"a step after {step_after_s} s is impossible", do="Give seconds from the start, 0 or more"
+            )
         self._wrench = wrench
         self._step_wrench = step_wrench or wrench
         start_ns = monotonic_ns() if started_ns is None else started_ns
@@ -46,8 +48,8 @@ def parse_wrench(text: str) -> Vector6:
     try:
         fx, fy, fz, mx, my, mz = (float(part) for part in text.split(","))
     except ValueError:
-        raise UsageError(f"{text!r} is no wrench", do=help_text) from None
+        raise UsageError(f"{text!r} is not a wrench", do=help_text) from None
     forces_fit = all(abs(value) <= LARGEST_FORCE_N for value in (fx, fy, fz))
     if not (forces_fit and all(abs(value) <= LARGEST_TORQUE_NM for value in (mx, my, mz))):
-        raise UsageError(f"{text!r} is beyond what the sensor can say", do=help_text)
+        raise UsageError(f"{text!r} is beyond what the sensor can report", do=help_text)
     return fx, fy, fz, mx, my, mz

@@ -32,7 +32,7 @@ class ContactOutcome(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def in_contact(self) -> bool:
-        """Whether ball and slider touch; the contact point and the normal are meaningful only then."""
+        """Return whether ball and slider touch; the contact point and the normal are meaningful only then."""
         return self.mode is not ContactMode.FREE
 
 

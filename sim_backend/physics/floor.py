@@ -57,7 +57,7 @@ class Floor:
                 do="Push lower, or lower the floor's friction",
             )  # fmt: skip
         if not 0 < effects.along_over_across < inf:
-            raise ConfigError(f"{effects.along_over_across} is no ratio of frictions", where="floor")
+            raise ConfigError(f"{effects.along_over_across} is not a ratio of frictions", where="floor")
         if not (0 <= effects.patch_strength < 1 and 0 < effects.patch_m < inf):
             raise ConfigError("floor patches need a strength from 0 to below 1 and a size", where="floor")
         self._model = model

@@ -64,7 +64,7 @@ class ConvexPolygon:
         )
 
     def contains(self, point: Point) -> bool:
-        """Whether a point (BODY frame) lies inside or on the edge."""
+        """Return whether a point (BODY frame) lies inside or on the edge."""
         return all(f.offset <= f.normal_x * point[0] + f.normal_y * point[1] for f in self.faces)
 
     def mean_distance_m(self, point: Point) -> float:
@@ -161,7 +161,7 @@ class Circle:
         return (0.0, 0.0)
 
     def contains(self, point: Point) -> bool:
-        """Whether a point (BODY frame) lies inside or on the edge."""
+        """Return whether a point (BODY frame) lies inside or on the edge."""
         return math.hypot(*point) <= self.radius_m
 
     def mean_distance_m(self, point: Point) -> float:
@@ -201,7 +201,7 @@ Shape = ConvexPolygon | Circle
 
 
 def positive(value: float) -> bool:
-    """Whether a length is a finite number above 0."""
+    """Return whether a length is a finite number above 0."""
     return math.isfinite(value) and value > 0
 
 

@@ -90,7 +90,7 @@ class RosGraph:
         return self.topics.get(self.resolve(name) if name in self._spellings else name)
 
     def wanted(self, name: str) -> bool:
-        """Tell whether anybody listens."""
+        """Return whether anybody listens."""
         topic = self.topics.get(name)
         return topic is not None and bool(topic.subscriptions or topic.listeners)
 

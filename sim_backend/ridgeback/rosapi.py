@@ -45,7 +45,7 @@ class RosApi:
             arguments = {}
         wrong = [key for key, value in arguments.items() if key not in fields or not isinstance(value, str)]
         if wrong:
-            return False, f"{service}: no such argument, or no string: {wrong[0]}"
+            return False, f"{service}: no such argument, or not a string: {wrong[0]}"
         return True, function(*(arguments.get(field, "") for field in fields))
 
     def _topic_type(self, name: str) -> dict[str, Any]:

@@ -259,7 +259,7 @@ class Session:
             try:
                 message = json.loads("".join(parts[key] for key in sorted(parts)))
             except (ValueError, RecursionError) as error:
-                raise _Wrong("the fragments together are no JSON") from error
+                raise _Wrong("the fragments together are not JSON") from error
             self._perform(message)
 
     def _withdraw(self, name: str) -> None:

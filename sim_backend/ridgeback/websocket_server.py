@@ -195,7 +195,7 @@ class WebSocketServer:
         ping_timeout_s: float = 0.0,
     ) -> None:
         if not ipaddress.ip_address(host).is_loopback:
-            raise UsageError(f"{host} is no loopback address", where="emulated bridge", do="Use 127.0.0.1")
+            raise UsageError(f"{host} is not a loopback address", where="emulated bridge", do="Use 127.0.0.1")
         self.loop = loop
         self.on_open, self.on_text, self._on_close = on_open, on_text, on_close
         self.host, self.port = host, port

@@ -92,7 +92,7 @@ class UrController:
 
     @property
     def ready(self) -> bool:
-        """Whether programs may run."""
+        """Return whether programs may run."""
         return self.robot_mode == RobotMode.RUNNING and self.safety_mode in MAY_MOVE
 
     def start_program(self, program: Program) -> None:

@@ -34,7 +34,7 @@ class ArmMotion:
 
     @property
     def steady(self) -> bool:
-        """Whether every joint is at rest."""
+        """Return whether every joint is at rest."""
         return all(abs(v) < STEADY_RAD_PER_S for v in self.velocity)
 
     def hold(self) -> None:

@@ -39,6 +39,6 @@ class Watchdog:
         self._since_ns = now_ns
 
     def tripped(self, now_ns: int) -> bool:
-        """Whether the register was left alone for too long."""
+        """Return whether the register was left alone for too long."""
         last_ns = max(self._since_ns, self._registers.int_written_ns[self._index])
         return now_ns - last_ns > self._limit_ns

@@ -85,7 +85,7 @@ class BasePlant:
 
     @property
     def drivers_active(self) -> bool:
-        """Whether the motors are driven."""
+        """Return whether the motors are driven."""
         return self._drivers_active
 
     def command(self, twist: BodyTwist, arrival_ns: int) -> int:

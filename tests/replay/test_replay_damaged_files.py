@@ -46,9 +46,9 @@ def foreign(profile: str, encoding: str, *, config: str | None) -> bytes:
 
 
 NOT_OURS = {
-    "empty": (b"", "no MCAP"),
-    "text": (b"hello, I am a log\n" * 100, "no MCAP"),
-    "random": (random.Random(1).randbytes(100_000), "no MCAP"),
+    "empty": (b"", "not an MCAP"),
+    "text": (b"hello, I am a log\n" * 100, "not an MCAP"),
+    "random": (random.Random(1).randbytes(100_000), "not an MCAP"),
     "random behind the magic": (b"\x89MCAP0\r\n" + random.Random(2).randbytes(5000), "truncated"),
     "random within the magic": (b"\x89MCAP0\r\n" + random.Random(3).randbytes(5000) + b"\x89MCAP0\r\n", ""),
     "another profile": (foreign("ros1", "cdr", config=None), "profile"),

@@ -171,7 +171,7 @@ def test_a_format_that_is_no_number_is_damage(said, sim_log, tmp_path, capsys):
     log = rewritten(sim_log, tmp_path / "run.mcap", metadata=facts(format=said))
     code, error = replayed(capsys, log)
     assert code == DAMAGED
-    assert "which is no number" in error["error"]["what"]
+    assert "which is not a number" in error["error"]["what"]
 
 
 def test_two_installations_without_a_checkout_are_told_apart_by_their_version():

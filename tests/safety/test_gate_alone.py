@@ -68,7 +68,7 @@ class Gate:
             self.child.hear()
             return self.child.ready is not None
 
-        assert until(ready), self.child.errors or self.child.last_words()
+        assert until(ready), self.child.errors or self.child.last_stderr_line()
 
     def tell(self, twist: BodyTwist) -> None:
         """Send a frame; raise HostStalled where the test was held up, so that the gate may take it for silent."""
@@ -97,7 +97,7 @@ class Gate:
         """End as control does, and wait for the gate's end."""
         self.link.close()
         assert until(lambda: self.child.process.poll() is not None), "the gate did not end"
-        assert self.child.process.returncode == 0, self.child.last_words()
+        assert self.child.process.returncode == 0, self.child.last_stderr_line()
         self.child.hear()
 
     def log(self) -> tuple[list[int], list[tuple[int, BodyTwist]]]:

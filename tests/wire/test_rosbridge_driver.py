@@ -221,7 +221,7 @@ def test_a_server_that_accepts_and_says_nothing():
 
 
 def test_something_that_is_no_websocket_server(http_server: str):
-    with pytest.raises(DeviceProtocolError, match="no websocket server"), Ridgeback(http_server):
+    with pytest.raises(DeviceProtocolError, match="not a websocket server"), Ridgeback(http_server):
         pass
 
 
@@ -276,14 +276,14 @@ def test_a_type_that_cannot_be_used_is_refused_before_connecting():
 def test_nobody_listens_to_the_commands():
     with running_bridge() as bridge:
         bridge.do("subscriber_missing")
-        with pytest.raises(DeviceNotReady, match="nobody listens"), Ridgeback(bridge.url):
+        with pytest.raises(DeviceNotReady, match="nothing subscribes"), Ridgeback(bridge.url):
             pass
 
 
 def test_another_client_of_the_bridge_is_no_listener():
     with running_bridge() as bridge, Ridgeback(bridge.url, topics=QUICK):  # this one subscribes to the command topic
         bridge.do("subscriber_missing")
-        with pytest.raises(DeviceNotReady, match="nobody listens"), Ridgeback(bridge.url, topics=QUICK):
+        with pytest.raises(DeviceNotReady, match="nothing subscribes"), Ridgeback(bridge.url, topics=QUICK):
             pass
 
 

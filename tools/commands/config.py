@@ -15,7 +15,7 @@ from tools.rig import resolve_rig
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags."""
     parser.add_argument(
-        "action", choices=("show", "check"), help="show: print every value; check: only say if it is good"
+        "action", choices=("show", "check"), help="show: print every value; check: only say whether it is valid"
     )
     parser.add_argument("rig", nargs="?", default="emulated", help=f"{', '.join(shipped_rigs())}, or a path (emulated)")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one value, repeatable")
@@ -31,5 +31,5 @@ def run(args: argparse.Namespace) -> int:
     elif args.action == "show":
         sys.stdout.write(rig_to_toml(rig))
     else:
-        tell(f"{args.rig}: good ({rig.description or rig.name})")
+        tell(f"{args.rig}: valid ({rig.description or rig.name})")
     return 0

@@ -26,10 +26,10 @@ from tools.places.find_log import find_log
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the actions and their flags."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="info|cat|export|recover")
-    info = actions.add_parser("info", help="what the log holds, after checking every byte of it")
+    info = actions.add_parser("info", help="what the log holds, with every byte checked")
     cat = actions.add_parser("cat", help="every message as one line of JSON; NaN and infinities become null")
     export = actions.add_parser("export", help="one CSV file per topic, units in the head line")
-    saved = actions.add_parser("recover", help="make a whole log of a truncated one")
+    saved = actions.add_parser("recover", help="repair a truncated log")
     for action in (info, cat, export, saved):
         action.add_argument("log", type=Path, help="run.mcap, or a run's folder")
         action.add_argument("--json", action="store_true", help="one JSON object on stdout, last")

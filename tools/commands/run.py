@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from robot_io.error_report import exit_code_matters_more, say_json, tell
+from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.no_report:
         report(summary, out, early)
         write_summary(summary, out)
-    with exit_code_matters_more():
+    with ignoring_output_errors():
         for line in verdict.person_lines(summary):
             tell(line) if args.json else print(line)
         if args.json:

@@ -45,7 +45,7 @@ class ReplayResult(msgspec.Struct, frozen=True):
 
     @property
     def different(self) -> bool:
-        """Whether anything came out otherwise than it is in the log."""
+        """Return whether anything came out otherwise than it is in the log."""
         parts = (self.world, self.derived, self.arrived)
         return self.first_difference is not None or any(part and part.first_difference for part in parts)
 

@@ -57,7 +57,7 @@ class VerifiedLog:
         except LogDamaged as error:
             raise self._damaged(error.what) from None
         self.config_holds = self._seal_of_config_holds(summary)
-        """Whether config.toml is the one that the log was finished with."""
+        """Return whether config.toml is the one that the log was finished with."""
         self.notes: tuple[str, ...] = ()
         """What of the config means nothing today, and what is not sealed."""
         self._rig = self._read_rig(summary)
@@ -82,12 +82,12 @@ class VerifiedLog:
 
     @property
     def complete(self) -> bool:
-        """Whether the end is there; what was recovered of a truncated log has none."""
+        """Return whether the end is there; what was recovered of a truncated log has none."""
         return self._end is not None
 
     @property
     def in_contact(self) -> bool:
-        """Whether the run started in contact."""
+        """Return whether the run started in contact."""
         return self.facts.get("in_contact") == "True"
 
     @property

@@ -35,7 +35,7 @@ class Series:
         return len(self._columns[0])
 
     def wants(self) -> bool:
-        """Tell whether the next sample is kept."""
+        """Return whether the next sample is kept."""
         wanted = self._seen % self.stride == 0
         self._seen += 1
         return wanted

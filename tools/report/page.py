@@ -70,7 +70,7 @@ def run_mark(run: RunData) -> str:
 
 
 def may_write(out_html: Path, mark: str) -> bool:
-    """Tell whether nothing is there, or a report of the same run."""
+    """Return whether nothing is there, or a report of the same run."""
     try:
         with out_html.open(encoding="utf-8", errors="replace") as file:
             head = file.read(4096)

@@ -286,5 +286,5 @@ class _Reader:
 
     def _foreign(self, what: str) -> LogDamaged:
         return LogDamaged(
-            f"this is no log of a push: {what}", where=str(self._path), do="Give the run.mcap of a `push run`"
+            f"this is not the log of a push: {what}", where=str(self._path), do="Give the run.mcap of a `push run`"
         )

@@ -31,7 +31,7 @@ def verdict(run: RunData) -> Verdict:
     """Return the verdict of a run, as far as its log tells."""
     if run.last is None:
         return Verdict(
-            "Never began", "The loop made no tick: the devices were not ready, or it was stopped before.", False
+            "Never began", "The loop did not start: the devices were not ready, or it was stopped first.", False
         )
     last = run.last
     end = outcome(last.input, last.after, last.output)
@@ -43,8 +43,8 @@ def verdict(run: RunData) -> Verdict:
     if not last.output.finished:
         phase = str(end["phase"]).lower().replace("_", " ")
         return Verdict(
-            f"Broken off after {distance}",
-            f"The log ends while the run goes on (phase {phase}){': ' + why if why else ''}.",
+            f"Aborted after {distance}",
+            f"The log ends in mid-run (phase {phase}){': ' + why if why else ''}.",
             False,
         )
     if last.output.exit_code == 0:
@@ -72,7 +72,7 @@ def tiles(run: RunData) -> list[tuple[str, str]]:
     found = [
         ("distance", f"{end['distance_m']:.3f} of {run.rig.control.distance_m:g} m"),
         ("lateral error at the end", f"{end['lateral_error_m']:+.3f} m"),
-        ("furthest off the path", _number(_furthest(ticks["lateral_m"][pushing]), "m", "+.3f")),
+        ("maximum deviation", _number(_furthest(ticks["lateral_m"][pushing]), "m", "+.3f")),
         ("time pushing", f"{pushed_s:.1f} s"),
         ("force while pushing, median", _number(float(np.median(size[pushing])) if pushing.any() else math.nan, "N")),
         ("greatest force", _number(float(np.nanmax(raw)) if np.isfinite(raw).any() else math.nan, "N")),

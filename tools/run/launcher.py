@@ -92,7 +92,7 @@ class Launcher:
 
     @property
     def began(self) -> bool:
-        """Whether every device was ready and the loop was let go."""
+        """Return whether every device was ready and the loop was let go."""
         return self._began
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
@@ -118,7 +118,7 @@ class Launcher:
     def _tell_priorities(self) -> None:
         plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
         if plain:
-            self._live.say(f"no right to real-time priority for {', '.join(plain)}: supported at 100 Hz")
+            self._live.say(f"no permission for real-time priority for {', '.join(plain)}: only 100 Hz is supported")
 
     def _listen(self, child: Child) -> None:
         self._loop.add_fd(child.status.fd, lambda _events: self._hear(child))
@@ -233,7 +233,7 @@ class Launcher:
         if not said.get("complete", False):
             self.notes.append("the log is not complete: `push log recover` may save it")
         if dropped := sum(said.get("dropped", {}).values()):
-            self.notes.append(f"{dropped} records did not fit into the log's rings")
+            self.notes.append(f"{dropped} records did not fit into the log's ring buffers")
 
     def _figures(self) -> dict[str, Any]:
         """Return control's figures, or those of the log when control cannot say them any more."""
@@ -241,18 +241,18 @@ class Launcher:
         if control.finished is not None:
             figures: dict[str, Any] = control.finished
             if figures["error"]:
-                self.notes.append(f"{figures['error']}; this is a defect, its traceback is in {control.keep_words()}")
+                self.notes.append(f"{figures['error']}; this is a bug, its traceback is in {control.save_stderr()}")
             return figures
         if self._killed_by_operator:
             code, how = OperatorStop.exit_code, "was killed by the operator"
         elif control.process.returncode < 0:
             code, how = SafetyStop.exit_code, control.how_it_ended()
         else:
-            code, how = control.process.returncode, f"{control.how_it_ended()}, see {control.keep_words()}"
+            code, how = control.process.returncode, f"{control.how_it_ended()}, see {control.save_stderr()}"
         stopped = f"the control process {how}; the gate stopped the base"
         try:
             figures = figures_of(self.log, self._rig.loop.rate_hz, code)
         except PushError as unreadable:
-            raise SafetyStop(stopped, where="control", do=f"Its log says nothing more ({unreadable.what})") from None
+            raise SafetyStop(stopped, where="control", do=f"Its log holds nothing more ({unreadable.what})") from None
         self.notes.append(stopped)
         return figures

@@ -51,7 +51,7 @@ def engine(name: str, scheduler: str | None) -> Iterator[None]:
     except (OSError, ValueError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise EnvironmentFault(
-            f"no Dask scheduler answers: {reason}", where=scheduler, do="Start one with `dask scheduler`"
+            f"no Dask scheduler responds: {reason}", where=scheduler, do="Start one with `dask scheduler`"
         ) from None
     with client:
         try:
@@ -92,7 +92,8 @@ def run_items(
             yield from results
         except TerminatedWorkerError:
             raise PushError(
-                "a worker process died (was memory short?)", do="Go on with --resume, and fewer --workers if need be"
+                "a worker process died (out of memory?)",
+                do="Continue with --resume, perhaps with fewer --workers",
             ) from None
         except BaseException:
             if local:

@@ -124,7 +124,7 @@ def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None)
     timing = timing_of(file.time, dt_s, name)
     if len(cases) * timing.records > MOST_STATES:
         raise ConfigError(
-            f"this grid would keep {len(cases) * timing.records} states, more than {MOST_STATES}",
+            f"this grid would record {len(cases) * timing.records} states, more than {MOST_STATES}",
             where=name,
             do="Raise record_s, or run fewer cases",
         )

@@ -69,10 +69,10 @@ def hardware_sentences(summary: dict[str, Any]) -> list[str]:
         )
         if (growth := s["closed_loop_weave_growth"]) is not None and growth > 1:
             lines.append(
-                f"  the weave grows: |y| reaches {growth:.2f} times as far in the second half of the way as in the "
+                f"  the oscillation grows: |y| reaches {growth:.2f} times as far in the second half as in the "
                 "first (median); `push tune` gives gains that settle"
             )
-    return [*lines, *(f"  otherwise than in the paper: {line}" for line in summary["otherwise_than_the_paper"])]
+    return [*lines, *(f"  unlike the paper: {line}" for line in summary["otherwise_than_the_paper"])]
 
 
 def _growth(poses: Floats) -> float:

@@ -98,7 +98,7 @@ def _run(item: LaneItem) -> Part:
         if all(map(math.isfinite, (*result.final, result.max_abs_y_c_m, result.max_abs_theta_p_rad))):
             rows.append(_parameters(item.first + i, case) | _result(result))
         else:
-            rows.append(_failed(item.first + i, case, "its state left the range of numbers"))
+            rows.append(_failed(item.first + i, case, "its state overflowed"))
             states[i] = np.nan
     return Part(rows, {"states": np.asarray(states)})
 

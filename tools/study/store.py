@@ -118,7 +118,7 @@ def _found(out: Path) -> str | None:
         return None
     except OSError as error:
         raise UsageError(
-            f"this cannot be a study's folder: {error.strerror}", where=str(out), do="Give another --out"
+            f"this cannot be a study folder: {error.strerror}", where=str(out), do="Give another --out"
         ) from None
     if not entries:
         return None
@@ -127,7 +127,7 @@ def _found(out: Path) -> str | None:
     except (OSError, ValueError, KeyError, TypeError):
         found = None
     if not isinstance(found, str):
-        raise UsageError("this folder holds something else than a study", where=str(out), do="Give another --out")
+        raise UsageError("this is not a study folder", where=str(out), do="Give another --out")
     return found
 
 

@@ -31,7 +31,7 @@ def draw(limits: Sequence[tuple[float, float]], recommended: tuple[float, float]
     k_f = [point[0] for point in limits]
     k_y = [max(point[1], 0.0) for point in limits]
     top = 1.15 * max(*k_y, *(gains[1] for gains in PRESETS.values()))
-    axes.fill_between(k_f, k_y, top, color="tab:red", alpha=0.15, label="weaves or runs off for some slider")
+    axes.fill_between(k_f, k_y, top, color="tab:red", alpha=0.15, label="oscillates or diverges for some slider")
     axes.fill_between(k_f, [WARN_SHARE * v for v in k_y], k_y, color="tab:orange", alpha=0.25, label="little margin")
     axes.fill_between(k_f, 0.0, [WARN_SHARE * v for v in k_y], color="tab:green", alpha=0.2, label="stable for all")
     for name, (f, y) in PRESETS.items():

@@ -27,8 +27,8 @@ def gain_warning(rig: RigConfig) -> str | None:
         return None
     told = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
     return (
-        f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may weave: for the sliders of this rig at this k_f "
-        f"{told}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds others"
+        f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may oscillate: for the sliders of this rig at this k_f "
+        f"{told}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds better ones"
     )
 
 

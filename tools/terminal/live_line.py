@@ -92,7 +92,7 @@ class LiveLine:
             return
 
     def _would_block(self) -> bool:
-        """Tell whether nobody takes our lines now (a stopped terminal, a full pipe): then they are left out.
+        """Return whether nobody takes our lines now (a stopped terminal, a full pipe): then they are left out.
 
         Whoever waits for the terminal cannot hear the operator.
         """

@@ -41,13 +41,13 @@ def combined(failed: list[Child], rig: RigConfig) -> PushError:
 def not_in_time(waiting: list[Child], rig: RigConfig) -> DeviceError:
     """Return the error of processes that neither became ready nor failed."""
     names = ", ".join(f"{_device(child.name, rig)} (process {child.pid})" for child in waiting)
-    return DeviceError(f"not ready in time: {names}", do="Look at what this machine is busy with, and try again")
+    return DeviceError(f"not ready in time: {names}", do="Check what this machine is busy with, and try again")
 
 
 def _failures(child: Child) -> list[Failure]:
     if child.errors:
         return [Failure(child.name, error) for error in child.errors]
-    do = f"This is a defect of the program; all it said is in {child.keep_words()}" if child.last_words() else ""
+    do = f"This is a bug in the program; its output is in {child.save_stderr()}" if child.last_stderr_line() else ""
     return [Failure(child.name, PushError(f"its process {child.how_it_ended()}", do=do))]
 
 

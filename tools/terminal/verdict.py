@@ -95,7 +95,7 @@ def why(summary: dict[str, Any]) -> str:
 
 def lost(contact_seen: bool) -> str:
     """Return why a push failed without contact; an object too light to be felt may have been there all the same."""
-    return "the force did not come back" if contact_seen else "no contact was felt"
+    return "the force did not return" if contact_seen else "no contact was felt"
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -248,7 +248,7 @@ def test_rubbish_is_refused_or_reads_as_exactly_itself():
     for end in range(len(payload)):
         with pytest.raises(LogDamaged):
             EVERYTHING.decode(payload[:end])
-    with pytest.raises(LogDamaged, match="too many"):
+    with pytest.raises(LogDamaged, match="left over"):
         EVERYTHING.decode(payload + b"\x00")
 
 
@@ -317,9 +317,9 @@ def test_values_that_do_not_fit_are_a_value_error_that_names_the_type(value):
 
 def test_fixed_arrays_must_have_their_length():
     value = everything(random.Random(6))
-    with pytest.raises(ValueError, match="array of 5 where 6"):
+    with pytest.raises(ValueError, match="array of 5 elements instead of 6"):
         EVERYTHING.encode(msgspec.structs.replace(value, joints=(1.0,) * 5))
-    with pytest.raises(ValueError, match="array of 1 where 2"):
+    with pytest.raises(ValueError, match="array of 1 elements instead of 2"):
         EVERYTHING.encode(msgspec.structs.replace(value, pair=value.pair[:1]))
 
 

@@ -190,7 +190,7 @@ def test_what_is_no_serial_port_is_refused(tmp_path):
     with pytest.raises(DeviceUnreachable, match="cannot be used as a serial port"):
         Ft300(str(tmp_path)).open()
     assert plain.read_text() == "x"
-    with pytest.raises(UsageError, match="no port of an FT 300"):
+    with pytest.raises(UsageError, match="not a port of an FT 300"):
         Ft300("hwgrep://FTDI").open()
 
 
@@ -217,7 +217,7 @@ def test_a_closed_tcp_port_fails_at_once():
              "127.0.0.1:4000/tty", "127.0.0.1:4000?logging=debug", "[::1:4000"],
 )  # fmt: skip
 def test_a_tcp_address_that_names_no_port_is_a_usage_error(rest):
-    with pytest.raises(UsageError, match="no port of an FT 300") as caught:
+    with pytest.raises(UsageError, match="not a port of an FT 300") as caught:
         Ft300(f"socket://{rest}").open()
     assert "socket://host:port" in caught.value.do
 

@@ -85,7 +85,7 @@ def test_a_damaged_length_is_an_error_after_the_good_records_and_then_it_goes_on
     ring.push(2, 20, bytes(24))
     os.pwrite(ring.fd, struct.pack("<I", length), 192 + 24)
     assert ring.pop_all() == [(1, 10, b"good")]
-    with pytest.raises(LogDamaged, match="no record"):
+    with pytest.raises(LogDamaged, match="not a record"):
         ring.pop_all()
     ring.push(3, 30, b"again")
     assert ring.pop_all() == [(3, 30, b"again")]
@@ -101,7 +101,7 @@ def test_a_damaged_head_is_an_error(ring, head):
 
 def test_a_descriptor_that_is_no_ring_is_refused():
     fd = os.memfd_create("empty")
-    with pytest.raises(ValueError, match="no ring"):
+    with pytest.raises(ValueError, match="not a ring"):
         Ring(fd)
     os.close(fd)
 

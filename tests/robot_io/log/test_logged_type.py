@@ -141,7 +141,7 @@ def test_a_value_that_was_in_other_fields_is_made_of_them(monkeypatch):
 
 
 def test_what_is_no_such_message_is_damage():
-    with pytest.raises(LogDamaged, match="stands where a push_msgs/msg/Whole belongs"):
+    with pytest.raises(LogDamaged, match="where a push_msgs/msg/Whole is expected"):
         LoggedType(TODAY, "push_msgs/msg/Part", PART, 1)
     with pytest.raises(LogDamaged, match="cannot be read"):
         LoggedType(TODAY, NAME, "wstring n\n", 1)

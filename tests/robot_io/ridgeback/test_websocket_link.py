@@ -97,13 +97,13 @@ def test_a_broken_frame_is_a_lost_link(ends, bad):
         receive(link)
 
 
-@pytest.mark.parametrize("last_words", [b"", frame(TEXT, b"last words")])
-def test_the_driver_says_so_and_raises_nothing(ends, last_words):
+@pytest.mark.parametrize("last_stderr_line", [b"", frame(TEXT, b"last words")])
+def test_the_driver_says_so_and_raises_nothing(ends, last_stderr_line):
     link, bridge = ends
     base = Ridgeback(URL)
     base._link, base._started, base._state = link, True, LinkState.UP
     base.newest_inbound_ns = time.monotonic_ns()
-    bridge.sendall(last_words + GOODBYE)
+    bridge.sendall(last_stderr_line + GOODBYE)
     assert link.wait_readable(time.monotonic_ns() + 2_000_000_000)
     base.drain()
     assert base.command(BodyTwist(0.1, 0.0, 0.0)) == BodyTwist()

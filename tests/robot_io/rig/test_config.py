@@ -131,7 +131,7 @@ def test_broken_toml_names_file_and_line(tmp_path):
     [
         ("k_f = " + "1" * 5000, "not TOML"),
         ("loop.rate_hz = 0x" + "f" * 5000, "out of range"),
-        (".".join("a" * 20_000) + " = 1", "nested too deep"),
+        (".".join("a" * 20_000) + " = 1", "nested too deeply"),
         ("\n".join(f"k{i} = 1" for i in range(20_000)), "too many for a rig"),
         ('description = """\n' + " " * 60_000 + '\n"""', "`name` is missing"),
         ('description = """\n[' + " " * 60_000 + '\n"""', "`name` is missing"),

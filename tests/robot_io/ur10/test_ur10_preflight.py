@@ -112,7 +112,7 @@ def test_reduced_mode_is_fine(robot) -> None:
 def test_silence_is_bounded(robot, fault: str) -> None:
     robot.call(fault, True)
     try:
-        assert "says nothing" in refused(robot.host, DeviceUnreachable)
+        assert "sends nothing" in refused(robot.host, DeviceUnreachable)
     finally:
         robot.call(fault, False)
 

@@ -129,7 +129,7 @@ def test_a_dead_or_frozen_child_is_stopped_by_the_controller(robot, arm, number:
 def test_refuses_a_playing_program_and_leaves_it_playing(robot) -> None:
     robot.call("play_other_program", "theirs")
     wait_until(lambda: robot.get("controller.runtime_state") == 2, "it plays")
-    with pytest.raises(DeviceNotReady, match="program is playing"):
+    with pytest.raises(DeviceNotReady, match="program is running"):
         Ur10(robot.host, hold="servo", held_pose_rad=HELD).open()
     assert robot.get("controller.runtime_state") == 2
     assert robot.get("controller.program.name") == "theirs"
@@ -142,7 +142,7 @@ def test_refuses_a_paused_program(robot) -> None:
     robot.call("play_other_program", "theirs")
     wait_until(lambda: robot.get("controller.runtime_state") == 2, "it plays")
     robot.call("pause_program")
-    with pytest.raises(DeviceNotReady, match="program is playing"):
+    with pytest.raises(DeviceNotReady, match="program is running"):
         Ur10(robot.host, hold="servo", held_pose_rad=HELD).open()
     assert robot.get("controller.runtime_state") == 4
 

@@ -227,7 +227,7 @@ def test_a_run_that_failed_before_any_contact(ran, ticks, tmp_path):
     assert "R02" in seen.words["td"]
 
 
-@pytest.mark.parametrize(("seen", "why"), [(True, "The force did not come back"), (False, "No contact was felt")])
+@pytest.mark.parametrize(("seen", "why"), [(True, "The force did not return"), (False, "No contact was felt")])
 def test_why_a_push_failed_without_and_after_a_contact(ran, ticks, tmp_path, seen, why):
     last = ticks[-1]
     control = replace(last.after.control, contact_seen=seen, phase=int(Phase.FAILED))
@@ -241,7 +241,7 @@ def test_a_log_that_ends_in_the_middle_of_a_push(ran, ticks, tmp_path):
     log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), ticks[: pushing[len(pushing) // 2]])
     found = verdict(read_run(log))
     assert not found.good
-    assert found.line.startswith("Broken off after 0.")
+    assert found.line.startswith("Aborted after 0.")
     assert "phase push" in found.why
 
 
@@ -256,7 +256,7 @@ def test_a_recovered_log(ran, tmp_path):
     write_report(tmp_path / "run.mcap", tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text()
     assert "This log was recovered" in text
-    assert "Broken off" in assert_self_contained(text).words["h1"]
+    assert "Aborted" in assert_self_contained(text).words["h1"]
 
 
 def test_numbers_beyond_all_reason_do_not_stop_it(ran, ticks, tmp_path):
@@ -284,8 +284,8 @@ def test_the_log_of_another_program_is_refused(ran, tmp_path):
     from robot_io.messages import Pose2D
 
     for topic, what in (
-        ("/control/tick", "Pose2D stands where a push_msgs/msg/ControlTick"),
-        ("/pose", "no log of a push"),
+        ("/control/tick", "Pose2D where a push_msgs/msg/ControlTick"),
+        ("/pose", "not the log of a push"),
     ):
         path = tmp_path / f"{topic[1:4]}.mcap"
         log = McapLog(path, config_text="x = 1" if topic == "/pose" else rig_to_toml(rig_of(ran[0])), metadata={})
@@ -371,7 +371,7 @@ def test_a_report_that_fails_is_said_and_fails_nothing(tmp_path, capsys, monkeyp
     assert summary["report"] is None
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "this is no MCAP file" in said
+    assert "this is not an MCAP file" in said
     monkeypatch.setattr(report_process, "TIMEOUT_S", 0.001)
     run_command.report(summary, tmp_path, None)
     assert summary["report"] is None

@@ -224,7 +224,7 @@ def test_a_case_beyond_the_range_of_numbers_is_an_error_and_no_nan(tmp_path, cap
     (row,) = rows_of(tmp_path / "out")
     assert row["code"] == "error"
     assert row["x"] == ""
-    assert "range of numbers" in row["error"]
+    assert "overflowed" in row["error"]
 
 
 def test_the_figure_draws_a_lost_push_to_its_very_end():
