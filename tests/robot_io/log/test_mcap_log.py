@@ -203,24 +203,7 @@ def test_a_bad_chunk_is_not_believed_and_what_is_before_it_can_be_saved(whole, t
     assert list(read_log(tmp_path / "out.mcap")) == list(read_log(whole))[: recovered.messages]
 
 
-def foreign(path: Path, *, profile: str = "ros2", message: str = "cdr", schema: str = "ros2msg") -> Path:
-    with path.open("wb") as file:
-        writer = Writer(file, enable_data_crcs=True)
-        writer.start(profile, "other")
-        schema_id = writer.register_schema("std_msgs/msg/String", schema, b"string data\n")
-        channel_id = writer.register_channel("/chatter", message, schema_id)
-        writer.add_message(channel_id, 1, b"{}", 1)
-        writer.finish()
-    return path
-
-
-@pytest.mark.parametrize("kind", [{"profile": "ros1"}, {"message": "json"}, {"schema": "jsonschema"}])
-def test_logs_of_other_encodings_are_refused_in_one_sentence(tmp_path, kind):
-    with pytest.raises(LogDamaged, match="not a log of this program"):
-        list(read_log(foreign(tmp_path / "x.mcap", **kind)))
-
-
-@pytest.mark.parametrize(("channels", "refused"), [(1000, False), (1002, True)])
+@pytest.mark.parametrize(("channels", "refused"), [(1000, False), (1001, True)])
 def test_a_log_of_more_than_a_thousand_topics_is_refused(tmp_path, channels, refused):
     """Each costs memory while nothing has been read yet; ours have about thirty."""
     with (tmp_path / "x.mcap").open("wb") as file:
@@ -232,7 +215,7 @@ def test_a_log_of_more_than_a_thousand_topics_is_refused(tmp_path, channels, ref
         writer.add_message(channel_id, 1, b"\0\1\0\0\2\0\0\0x\0", 1)
         writer.finish()
     if refused:
-        with pytest.raises(LogDamaged, match="too many channels"):
+        with pytest.raises(LogDamaged, match="more than 1000 channels"):
             list(read_log(tmp_path / "x.mcap"))
     else:
         assert [message.topic for message in read_log(tmp_path / "x.mcap")] == ["/topic999"]
