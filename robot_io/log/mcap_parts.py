@@ -24,13 +24,13 @@ class ExactStream(ReadDataStream):
 
     def __init__(self, body: bytes) -> None:
         super().__init__(io.BytesIO(body))
+        self._size = len(body)
 
     def read(self, length: int) -> bytes:
         """Return exactly so many bytes. Raises EndOfFile."""
-        data = super().read(length)
-        if len(data) < length:
+        if length > self._size - self.count:
             raise EndOfFile
-        return data
+        return super().read(length)
 
 
 def checksum_holds(said: int, crc: int, *, ours: bool) -> bool:

@@ -203,6 +203,7 @@ def test_a_checksum_that_is_there_is_checked(saved):
         (by_hand.file(OPENING, by_hand.record(3, by_hand.schema()[9:-3])), "damaged"),
         (by_hand.file(OPENING, by_hand.message(), end=b""), "truncated"),
         (by_hand.file(OPENING, by_hand.message(), end=by_hand.data_end()), "truncated"),
+        (by_hand.file(OPENING, by_hand.record(9, bytes(24) + b"\xff" * 12)), "damaged: a record cannot be read"),
         (b"", "no MCAP file, it is empty"),
         (b"\x89MCAP1\r\n", "no MCAP file"),
     ],
@@ -310,3 +311,27 @@ def test_a_log_of_ours_without_its_checksums_is_damaged_wherever_one_is_taken_ou
 def test_a_pipe_is_refused_by_the_readers_that_read_twice(tmp_path):
     with pytest.raises(UsageError, match="only once"):
         list(read_log(Path("/dev/null")))
+
+
+def test_a_file_without_checksums_spoilt_anywhere_is_read_or_refused(saved):
+    """Nothing says that it is damaged then but its structure: no other error, nothing large, nothing endless."""
+    content = OPENING[len(by_hand.header()) :] + by_hand.message()
+    good = by_hand.file(
+        by_hand.header(),
+        by_hand.chunk(content, "lz4", lz4.frame.compress(content)),
+        by_hand.chunk(content),
+        by_hand.message(),
+        by_hand.attachment("a", b"xyz"),
+        by_hand.metadata("m"),
+    )
+    rng = random.Random(5)
+    refused = 0
+    for _ in range(1500):
+        raw = bytearray(good)
+        at = rng.randrange(len(raw))
+        raw[at : at + rng.choice([0, 1, 4, 8])] = rng.choice([b"", b"\x00", b"\xff" * 4, b"\xff" * 8, rng.randbytes(1)])
+        try:
+            read_summary(saved(bytes(raw)))
+        except LogDamaged:
+            refused += 1
+    assert 500 < refused < 1500
