@@ -150,10 +150,11 @@ def _recover(args: argparse.Namespace) -> dict[str, Any]:
 
 def _told(decoders: Decoders, args: argparse.Namespace, messages: int) -> dict[str, str]:
     """Name what could not be read. Raises LogDamaged when it was asked for by name, or nothing else is there."""
-    for topic, why in decoders.unreadable.items():
-        tell(printable(f"{topic} left out: {why}"))
     wanted = [topic for topic in decoders.unreadable if topic in (args.topics or ()) or messages == 0]
+    for topic, why in decoders.unreadable.items():
+        if topic not in wanted[:1]:
+            tell(printable(f"{topic} left out: {why}"))
     if wanted:
-        why = decoders.unreadable[wanted[0]]
-        raise LogDamaged(f"{', '.join(wanted)} cannot be read: {why}", where=str(args.log), do=DO_OTHER_TOOL)
+        what = f"{wanted[0]} cannot be read: {decoders.unreadable[wanted[0]]}"
+        raise LogDamaged(what, where=str(args.log), do=DO_OTHER_TOOL)
     return decoders.unreadable
