@@ -225,13 +225,13 @@ class _Items(_Part):
 
 def _variable_part(path: str, leaf: Shape) -> _Part:
     match leaf:
-        case Text():
+        case Text(wide=False):
             return _Text(path)
         case Blob():
             return _Blob(path)
         case Many(Scalar() as element, None):
             return _Numbers(path, element)
-        case Many((Nested() | Text()) as element, count):
+        case Many((Nested() | Text(wide=False)) as element, count):
             return _Items(path, element, count)
     raise TypeError(f"{path}: {leaf!r} has no CDR form")
 

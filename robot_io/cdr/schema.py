@@ -1,7 +1,6 @@
 """Makes a message type out of the `ros2msg` text in a log, so that any topic can be read, also an older program's.
 
-The text is untrusted: sizes are bounded and a type cannot hold itself. Constants, defaults and bounds are left out,
-`wstring` and `char` are not known.
+The text is untrusted: sizes are bounded and a type cannot hold itself. Constants, defaults and bounds are left out.
 """
 
 from __future__ import annotations
@@ -12,26 +11,43 @@ from typing import Annotated, Any
 import msgspec
 
 from robot_io.cdr.cdr_type import CdrType
-from robot_io.cdr.shape import PRIMITIVES
+from robot_io.cdr.shape import PRIMITIVES, Nested, shape_of
 from robot_io.errors import LogDamaged
 
-_SEPARATOR = re.compile(r"^={3,}$", re.MULTILINE)
+_SEPARATOR = re.compile(r"^={3,}[ \t\r]*$", re.MULTILINE)
 _FIELD = re.compile(
-    r"(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[(?:<=)?\d*\])?\s+(?P<name>[a-z]\w*)(?:\s+[^=].*)?\Z"
+    r"(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[(?:<=)?\d*\])?\s+(?P<name>[A-Za-z]\w*)(?:\s+[^=].*)?\Z"
 )
 _CONSTANT = re.compile(r"\w+(?:<=\d+)?\s+[A-Z]\w*\s*=")
+ONLY_FIELD_OF_EMPTY = "structure_needs_at_least_one_member"
+"""The one byte that ROS 2 gives an empty message."""
 _LEAVES_MAX = 5000
 _DEPTH_MAX = 20
 
 
 def type_from_schema(name: str, text: str) -> CdrType[Any]:
     """Return the type of a message called `name` ("pkg/msg/Name"). Raises LogDamaged when the text cannot be used."""
+    shape = shape_from_schema(name, text)
     try:
-        definitions = _definitions(name, text)
-        struct_type, _ = _Maker(definitions).make(_short(name), 0)
-        return CdrType(struct_type, name)
-    except (ValueError, TypeError, KeyError) as error:
-        raise LogDamaged(f"the schema of {name[:100]} cannot be read: {error}") from None
+        return CdrType(shape.struct_type, name)
+    except TypeError as error:
+        raise _unusable(name, error) from None
+
+
+def shape_from_schema(name: str, text: str) -> Nested:
+    """Return the shape of a message called `name`. Raises LogDamaged when the text cannot be used."""
+    try:
+        struct_type, _ = _Maker(_definitions(name, text)).make(_short(name), 0)
+        shape = shape_of(struct_type)
+    except (ValueError, TypeError) as error:
+        raise _unusable(name, error) from None
+    if not isinstance(shape, Nested):
+        raise _unusable(name, "it is no message")
+    return shape
+
+
+def _unusable(name: str, why: object) -> LogDamaged:
+    return LogDamaged(f"the schema of {name[:100]} cannot be read: {why}")
 
 
 class _Maker:
@@ -46,6 +62,8 @@ class _Maker:
             return self._made[name]
         if depth > _DEPTH_MAX:
             raise ValueError("its types are nested too deeply")
+        if name not in self._definitions:
+            raise ValueError(f"{name[:60]} is not defined in it")
         fields: list[tuple[str, Any]] = []
         total = 0
         for line in self._definitions[name]:
@@ -59,8 +77,8 @@ class _Maker:
             raise ValueError("two fields have the same name")
         if total > _LEAVES_MAX:
             raise ValueError(f"it has more than {_LEAVES_MAX} fields")
-        if not fields:  # ROS 2 gives an empty message this one byte
-            fields, total = [("structure_needs_at_least_one_member", Annotated[int, "uint8"])], 1
+        if not fields:
+            fields, total = [(ONLY_FIELD_OF_EMPTY, Annotated[int, "uint8"])], 1
         package, _, short = name.partition("/")
         namespace = {"__ros_name__": f"{package}/msg/{short}"}
         self._made[name] = msgspec.defstruct(short, fields, namespace=namespace, frozen=True, gc=False), total
@@ -72,6 +90,8 @@ class _Maker:
             return (base if base is bool else Annotated[base, type_name]), 1
         if type_name == "string":
             return str, 1
+        if type_name == "wstring":
+            return Annotated[str, "wstring"], 1
         nested = _short(type_name) if "/" in type_name else f"{package}/{type_name}"
         return self.make(nested, depth + 1)
 

@@ -26,6 +26,7 @@ from robot_io.cdr.packer import Made, Slot, builder_of
 PRIMITIVES: dict[str, tuple[str, int]] = {
     "bool": ("?", 1),
     "byte": ("B", 1),
+    "char": ("B", 1),
     "int8": ("b", 1),
     "uint8": ("B", 1),
     "int16": ("h", 2),
@@ -52,7 +53,9 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Text:
-    """A string: uint32 length with the closing NUL, UTF-8 bytes, NUL."""
+    """A string: uint32 length with the closing NUL, UTF-8 bytes, NUL. A wide one, a `wstring`, is only read."""
+
+    wide: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,9 @@ def shape_of(annotation: Any) -> Shape:
         base, *notes = get_args(annotation)
         shape = shape_of(base)
         for note in notes:
-            if isinstance(note, str):
+            if note == "wstring" and isinstance(shape, Text):
+                shape = Text(wide=True)
+            elif isinstance(note, str):
                 shape = _with_width(shape, note, annotation)
             elif isinstance(note, int) and isinstance(shape, Many):
                 shape = Many(shape.element, note)
@@ -226,8 +231,8 @@ def _type_name(shape: Shape) -> str:
     match shape:
         case Scalar(ros):
             return ros
-        case Text():
-            return "string"
+        case Text(wide):
+            return "wstring" if wide else "string"
         case Blob():
             return "uint8[]"
         case Many(element, length):

@@ -5,6 +5,7 @@ for topic, log_time_ns, payload, schema_name in read_log(Path("run.mcap")): ...
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +13,9 @@ from typing import NamedTuple
 from mcap.records import Attachment, Message, Metadata
 
 from robot_io.log.mcap_walk import Topic, walk
+
+_LATCHED = re.compile(r"\bdurability: *(1|transient_local)\b")
+"""In the quality of service of a channel, as rmw numbers or names it."""
 
 
 class LogMessage(NamedTuple):
@@ -24,13 +28,15 @@ class LogMessage(NamedTuple):
 
 
 class ChannelInfo(NamedTuple):
-    """One topic of a log."""
+    """One channel of a log. Logs by others may have several of one topic, without a schema, of any encoding."""
 
     topic: str
     schema_name: str
     schema_text: str
     latched: bool
     messages: int
+    message_encoding: str
+    schema_encoding: str
 
 
 class LogSummary(NamedTuple):
@@ -83,8 +89,10 @@ def read_summary(path: Path) -> LogSummary:
             channel.topic,
             schema.name,
             schema.data.decode(errors="replace"),
-            "offered_qos_profiles" in channel.metadata,
+            _LATCHED.search(channel.metadata.get("offered_qos_profiles", "")) is not None,
             counts.get(channel.id, 0),
+            channel.message_encoding,
+            schema.encoding,
         )
         for channel, schema in topics
     )

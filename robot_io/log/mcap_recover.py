@@ -6,11 +6,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.records import Attachment, Message, Metadata
+from mcap.records import Attachment, Header, Message, Metadata
 
 from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
-from robot_io.log.mcap_log import CONFIG_ATTACHMENT, LIBRARY, PROFILE, create_new, finish_writer
-from robot_io.log.mcap_walk import LogItem, Topic, walk
+from robot_io.log.mcap_log import CONFIG_ATTACHMENT, create_new, finish_writer
+from robot_io.log.mcap_walk import NO_SCHEMA, LogItem, Topic, walk
 from robot_io.log.mcap_write import McapWriter
 from robot_io.log.seal import LogSeal, config_seal
 
@@ -33,13 +33,14 @@ def recover(path: Path, out_path: Path) -> Recovered:
     if out_path.exists():
         raise UsageError("there is already a file of this name", where=str(out_path), do="Give another name with --out")
     items = walk(path, finished=False)
-    first = next(items)  # nothing is created for a file that is no log
+    first = next(items)  # the header; nothing is created for a file that is no log
+    assert isinstance(first, Header)
     stream = create_new(out_path)
     try:
-        copy = _Copy(McapWriter(stream, PROFILE, LIBRARY))
+        # A log by others stays one: it is not held to what our own writer would have written.
+        copy = _Copy(McapWriter(stream, first.profile, first.library))
         cause = ""
         try:
-            copy.take(first)
             for item in items:
                 copy.take(item)
         except LogDamaged as damage:
@@ -73,7 +74,7 @@ class _Copy:
         self.writer = writer
         self.seal = LogSeal()
         self.config = b""
-        self._schemas: dict[int, int] = {}
+        self._schemas: dict[int, int] = {NO_SCHEMA.id: NO_SCHEMA.id}
         self._channels: dict[int, tuple[int, str]] = {}
         """New number and topic, by the old number."""
 

@@ -16,11 +16,15 @@ import msgspec
 
 from robot_io.clock import NS_PER_S
 from robot_io.error_report import SCHEMA, printable, say_json, tell
-from robot_io.errors import EnvironmentFault, UsageError
+from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
 from robot_io.log.mcap_read import LogSummary, read_summary
 from robot_io.log.mcap_recover import recover
 from tools.log.decode import Decoders, columns
+from tools.places.at_rest import at_rest, comes_once
 from tools.places.find_log import find_log
+
+STANDARD_INPUT = Path("/dev/stdin")
+DO_OTHER_TOOL = "Read it with the tool that wrote it; `push log info` names all that cannot be read here"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     export = actions.add_parser("export", help="one CSV file per topic, units in the head line")
     saved = actions.add_parser("recover", help="repair a truncated log")
     for action in (info, cat, export, saved):
-        action.add_argument("log", type=Path, help="run.mcap, or a run's folder")
+        action.add_argument("log", type=Path, help="run.mcap, a run's folder, or - for a pipe")
         action.add_argument("--json", action="store_true", help="one JSON object on stdout, last")
     for action in (cat, export):
         action.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these topics")
@@ -41,19 +45,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it; raises UsageError, EnvironmentFault or LogDamaged."""
-    args.log = find_log(args.log)
+    args.named = STANDARD_INPUT if args.log == Path("-") else find_log(args.log)
     actions = {"info": _info, "cat": _cat, "export": _export, "recover": _recover}
-    facts = actions[args.action](args)
+    unnamed = args.named == STANDARD_INPUT or comes_once(args.named)
+    if unnamed and args.action in ("export", "recover") and args.out is None:
+        raise UsageError("what comes out of a pipe has no name to make one of", do="Name the result with --out")
+    with at_rest(args.named) as args.log:
+        facts = actions[args.action](args)
     if args.json:
-        say_json({"schema": SCHEMA, "log": str(args.log), **facts})
+        say_json({"schema": SCHEMA, "log": str(args.named), **facts})
     return 0
 
 
 def _info(args: argparse.Namespace) -> dict[str, Any]:
     summary = read_summary(args.log)
     duration_s = (summary.end_ns - summary.start_ns) / NS_PER_S
+    unreadable = Decoders(summary, None).unreadable
     if not args.json:
-        print(_table(args.log, summary, duration_s))
+        print(_table(args.named, summary, duration_s, unreadable))
     return {
         "size_bytes": summary.size_bytes,
         "messages": summary.messages,
@@ -66,13 +75,15 @@ def _info(args: argparse.Namespace) -> dict[str, Any]:
         ],
         "metadata": summary.metadata,
         "attachments": {name: len(data) for name, data in summary.attachments.items()},
+        "unreadable": unreadable,
     }
 
 
-def _table(path: Path, summary: LogSummary, duration_s: float) -> str:
+def _table(path: Path, summary: LogSummary, duration_s: float, unreadable: dict[str, str]) -> str:
     width = max((len(c.topic) for c in summary.channels), default=0)
     lines = [f"{path}: {summary.size_bytes / 1e6:.2f} MB, {duration_s:.2f} s, {summary.messages} messages, whole"]
-    lines += [f"  {c.topic:{width}}  {c.messages:7}  {c.schema_name}" for c in summary.channels]
+    lines += [f"  {c.topic:{width}}  {c.messages:7}  {c.schema_name or '-'}" for c in summary.channels]
+    lines += [f"{topic} cannot be read: {why}" for topic, why in unreadable.items()]
     for name, values in summary.metadata.items():
         lines += [f"{name}:", *(f"  {key} = {value}" for key, value in values.items())]
     lines += [f"attached: {name}, {len(data)} bytes" for name, data in summary.attachments.items()]
@@ -82,11 +93,11 @@ def _table(path: Path, summary: LogSummary, duration_s: float) -> str:
 def _cat(args: argparse.Namespace) -> dict[str, Any]:
     decoders = Decoders(read_summary(args.log), args.topics)
     count = 0
-    for topic, log_time_ns, type_name, value in decoders.read(args.log):
+    for topic, log_time_ns, type_name, _, value in decoders.read(args.log):
         line = {"topic": topic, "log_time_ns": log_time_ns, "type": type_name, "message": value}
         sys.stdout.write(msgspec.json.encode(line).decode() + "\n")
         count += 1
-    return {"messages": count, "unreadable": _told(decoders)}
+    return {"messages": count, "unreadable": _told(decoders, args, count)}
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:
@@ -102,26 +113,31 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
         raise EnvironmentFault(f"the tables cannot be written: {error.strerror}", where=str(out)) from None
     for name, rows in files.items():
         tell(f"{out / name}: {rows} rows")
-    return {"out": str(out), "files": files, "unreadable": _told(decoders)}
+    return {"out": str(out), "files": files, "unreadable": _told(decoders, args, sum(files.values()))}
 
 
 def _write_tables(decoders: Decoders, log: Path, out: Path, start_ns: int) -> dict[str, int]:
     rows: dict[str, int] = {}
-    writers: dict[str, Any] = {}
+    names: dict[tuple[str, str], str] = {}
+    writers: dict[tuple[str, str], Any] = {}
     with ExitStack() as stack:
-        for topic, log_time_ns, _, value in decoders.read(log):
-            cells = columns(decoders.types[topic].shape, value)
-            name = topic.strip("/").replace("/", "_") + ".csv"
-            if topic not in writers:
-                if name in rows:
-                    raise UsageError(f"two topics would share {name}", do="Name one of them with --topics")
-                file = stack.enter_context((out / name).open("x", newline="", encoding="utf-8"))
-                writers[topic] = csv.writer(file)
-                writers[topic].writerow(["log_time [ns]", "time [s]", *(column for column, _ in cells)])
-                rows[name] = 0
+        for topic, log_time_ns, type_name, shape, value in decoders.read(log):
+            cells = columns(shape, value)
+            table = (topic, type_name)
+            if table not in writers:
+                # Only a log by others has several types of one topic.
+                several = any(topic == other for other, _ in writers)
+                name = f"{topic} {type_name}" if several else topic
+                names[table] = name.strip("/").replace("/", "_").replace(" ", ".") + ".csv"
+                if names[table] in rows:
+                    raise UsageError(f"two topics would share {names[table]}", do="Name one of them with --topics")
+                file = stack.enter_context((out / names[table]).open("x", newline="", encoding="utf-8"))
+                writers[table] = csv.writer(file)
+                writers[table].writerow(["log_time [ns]", "time [s]", *(column for column, _ in cells)])
+                rows[names[table]] = 0
             time_s = (log_time_ns - start_ns) / NS_PER_S
-            writers[topic].writerow([log_time_ns, time_s, *(cell for _, cell in cells)])
-            rows[name] += 1
+            writers[table].writerow([log_time_ns, time_s, *(cell for _, cell in cells)])
+            rows[names[table]] += 1
     return rows
 
 
@@ -132,7 +148,13 @@ def _recover(args: argparse.Namespace) -> dict[str, Any]:
     return {"out": str(out), "messages": saved.messages, "cause": saved.cause}
 
 
-def _told(decoders: Decoders) -> dict[str, str]:
+def _told(decoders: Decoders, args: argparse.Namespace, messages: int) -> dict[str, str]:
+    """Name what could not be read. Raises LogDamaged when it was asked for by name, or nothing else is there."""
+    wanted = [topic for topic in decoders.unreadable if topic in (args.topics or ()) or messages == 0]
     for topic, why in decoders.unreadable.items():
-        tell(printable(f"{topic} left out: {why}"))
+        if topic not in wanted[:1]:
+            tell(printable(f"{topic} left out: {why}"))
+    if wanted:
+        what = f"{wanted[0]} cannot be read: {decoders.unreadable[wanted[0]]}"
+        raise LogDamaged(what, where=str(args.log), do=DO_OTHER_TOOL)
     return decoders.unreadable

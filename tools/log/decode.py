@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
+from mcap.records import Message
 
-from robot_io.cdr.cdr_type import CdrType
-from robot_io.cdr.schema import type_from_schema
+from robot_io.cdr.of_others import ReaderOfOthers
+from robot_io.cdr.schema import shape_from_schema, type_from_schema
 from robot_io.cdr.shape import Blob, Many, Nested, Shape
 from robot_io.errors import LogDamaged, UsageError
-from robot_io.log.mcap_read import ChannelInfo, LogSummary, read_log
+from robot_io.log.mcap_log import LIBRARY, MESSAGE_ENCODING, SCHEMA_ENCODING
+from robot_io.log.mcap_read import LogSummary
+from robot_io.log.mcap_walk import Topic, walk
 
 # Unit of a field by the type that holds it; an empty field name stands for every field of the type.
 _UNITS: dict[str, dict[str, str]] = {
@@ -32,46 +35,102 @@ _UNITS: dict[str, dict[str, str]] = {
 
 
 class Decoded(NamedTuple):
-    """One message with its values."""
+    """One message with its values, and their shape."""
 
     topic: str
     log_time_ns: int
     type_name: str
+    shape: Nested
     value: Any
 
 
+class _Type(NamedTuple):
+    """What the messages of a channel are; a topic of a log by others may have several."""
+
+    topic: str
+    name: str
+    text: str
+    message_encoding: str
+    schema_encoding: str
+
+
+class _Decoder(NamedTuple):
+    shape: Nested
+    decode: Callable[[bytes], Any]
+
+
 class Decoders:
-    """Types of the topics of a log; `unreadable` names those whose schema cannot be used, with the reason."""
+    """Reads the wanted topics of a log (None: all); `unreadable` names those that cannot be read, with the reason."""
 
     def __init__(self, summary: LogSummary, topics: list[str] | None) -> None:
         known = {channel.topic for channel in summary.channels}
         missing = sorted(set(topics or ()) - known)
         if missing:
             raise UsageError(f"the log has no topic {', '.join(missing)}", do=f"It has {', '.join(sorted(known))}")
-        self.types: dict[str, CdrType[Any]] = {}
+        self._ours = summary.library == LIBRARY
+        self._decoders: dict[_Type, _Decoder] = {}
         self.unreadable: dict[str, str] = {}
         for channel in summary.channels:
             if topics is None or channel.topic in topics:
-                self._add(channel)
+                self._add(
+                    _Type(
+                        channel.topic,
+                        channel.schema_name,
+                        channel.schema_text,
+                        channel.message_encoding,
+                        channel.schema_encoding,
+                    )
+                )
 
     def read(self, path: Path) -> Iterator[Decoded]:
-        """Yield the messages of the wanted, readable topics; a payload that does not fit makes its topic unreadable."""
-        for topic, log_time_ns, payload, type_name in read_log(path):
-            cdr_type = self.types.get(topic)
-            if cdr_type is None or topic in self.unreadable:
-                continue
-            try:
-                value = cdr_type.decode(payload)
-            except LogDamaged as damage:
-                self.unreadable[topic] = damage.what
-                continue
-            yield Decoded(topic, log_time_ns, type_name, value)
+        """Yield the messages of the wanted, readable topics; a payload that does not fit ends the reading of its kind.
 
-    def _add(self, channel: ChannelInfo) -> None:
+        Raises as `read_log`.
+        """
+        types: dict[int, _Type] = {}
+        for item in walk(path):
+            if isinstance(item, Topic):
+                types[item.channel.id] = _type_of(item)
+            elif isinstance(item, Message):
+                its_type = types[item.channel_id]
+                decoder = self._decoders.get(its_type)
+                if decoder is None:
+                    continue
+                try:
+                    value = decoder.decode(item.data)
+                except LogDamaged as damage:
+                    self.unreadable[its_type.topic] = damage.what
+                    del self._decoders[its_type]
+                    continue
+                yield Decoded(its_type.topic, item.log_time, its_type.name, decoder.shape, value)
+
+    def _add(self, its_type: _Type) -> None:
         try:
-            self.types[channel.topic] = type_from_schema(channel.schema_name, channel.schema_text)
+            _require_known_encoding(its_type)
+            if self._ours:
+                cdr_type = type_from_schema(its_type.name, its_type.text)
+                self._decoders[its_type] = _Decoder(cdr_type.shape, cdr_type.decode)
+            else:
+                shape = shape_from_schema(its_type.name, its_type.text)
+                self._decoders[its_type] = _Decoder(shape, ReaderOfOthers(its_type.name, shape).decode)
         except LogDamaged as damage:
-            self.unreadable[channel.topic] = damage.what
+            self.unreadable[its_type.topic] = damage.what
+
+
+def _type_of(topic: Topic) -> _Type:
+    channel, schema = topic
+    text = schema.data.decode(errors="replace")
+    return _Type(channel.topic, schema.name, text, channel.message_encoding, schema.encoding)
+
+
+def _require_known_encoding(its_type: _Type) -> None:
+    if its_type.message_encoding != MESSAGE_ENCODING:
+        named = its_type.message_encoding[:20] or "of no named encoding"
+        raise LogDamaged(f"its messages are {named}, and only {MESSAGE_ENCODING} can be read")
+    if not its_type.schema_encoding:
+        raise LogDamaged("it has no schema, so that nothing says what its bytes mean")
+    if its_type.schema_encoding != SCHEMA_ENCODING:
+        raise LogDamaged(f"its schema is {its_type.schema_encoding[:20]}, and only {SCHEMA_ENCODING} can be read")
 
 
 def columns(shape: Nested, value: Any) -> list[tuple[str, Any]]:

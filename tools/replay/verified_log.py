@@ -13,7 +13,7 @@ from robot_io.errors import LogDamaged, PushError, ReplayDiffers
 from robot_io.log.chain import TickChain
 from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
-from robot_io.log.mcap_log import CONFIG_ATTACHMENT, END_METADATA, RUN_METADATA
+from robot_io.log.mcap_log import CONFIG_ATTACHMENT, END_METADATA, LIBRARY, RUN_METADATA
 from robot_io.log.mcap_read import LogMessage, LogSummary, read_log, read_summary
 from robot_io.log.mcap_recover import RECOVERED_METADATA
 from robot_io.log.seal import CONFIG_FACT, LogSeal, PayloadSeal, config_seal, seal_of
@@ -47,6 +47,9 @@ class VerifiedLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         summary = read_summary(path)
+        if summary.library != LIBRARY and CONFIG_ATTACHMENT not in summary.attachments:
+            what = f"this is not the log of a push: it holds no {CONFIG_ATTACHMENT}"
+            raise LogDamaged(what, where=str(path), do="Give the run.mcap of a `push run`")
         self._end = summary.metadata.get(END_METADATA)
         self._saved = summary.metadata.get(RECOVERED_METADATA)
         self.facts = summary.metadata.get(RUN_METADATA, {})

@@ -154,7 +154,7 @@ def test_truncated_anywhere_says_so_and_recovers_to_a_prefix(whole, tmp_path):
     saved = []
     for at in [0, 7, 8, 40, len(good) - 1, len(good) - 8, *(rng.randrange(8, len(good)) for _ in range(60))]:
         source.write_bytes(good[:at])
-        with pytest.raises(LogDamaged, match=r"truncated|no MCAP") as caught:
+        with pytest.raises(LogDamaged, match=r"truncated|not an MCAP") as caught:
             list(read_log(source))
         assert "push log recover" in caught.value.do or "push run" in caught.value.do
         target.unlink(missing_ok=True)
@@ -203,24 +203,7 @@ def test_a_bad_chunk_is_not_believed_and_what_is_before_it_can_be_saved(whole, t
     assert list(read_log(tmp_path / "out.mcap")) == list(read_log(whole))[: recovered.messages]
 
 
-def foreign(path: Path, *, profile: str = "ros2", message: str = "cdr", schema: str = "ros2msg") -> Path:
-    with path.open("wb") as file:
-        writer = Writer(file, enable_data_crcs=True)
-        writer.start(profile, "other")
-        schema_id = writer.register_schema("std_msgs/msg/String", schema, b"string data\n")
-        channel_id = writer.register_channel("/chatter", message, schema_id)
-        writer.add_message(channel_id, 1, b"{}", 1)
-        writer.finish()
-    return path
-
-
-@pytest.mark.parametrize("kind", [{"profile": "ros1"}, {"message": "json"}, {"schema": "jsonschema"}])
-def test_logs_of_other_encodings_are_refused_in_one_sentence(tmp_path, kind):
-    with pytest.raises(LogDamaged, match="not a log of this program"):
-        list(read_log(foreign(tmp_path / "x.mcap", **kind)))
-
-
-@pytest.mark.parametrize(("channels", "refused"), [(1000, False), (1002, True)])
+@pytest.mark.parametrize(("channels", "refused"), [(1000, False), (1001, True)])
 def test_a_log_of_more_than_a_thousand_topics_is_refused(tmp_path, channels, refused):
     """Each costs memory while nothing has been read yet; ours have about thirty."""
     with (tmp_path / "x.mcap").open("wb") as file:
@@ -232,7 +215,7 @@ def test_a_log_of_more_than_a_thousand_topics_is_refused(tmp_path, channels, ref
         writer.add_message(channel_id, 1, b"\0\1\0\0\2\0\0\0x\0", 1)
         writer.finish()
     if refused:
-        with pytest.raises(LogDamaged, match="too many channels"):
+        with pytest.raises(LogDamaged, match="more than 1000 channels"):
             list(read_log(tmp_path / "x.mcap"))
     else:
         assert [message.topic for message in read_log(tmp_path / "x.mcap")] == ["/topic999"]
@@ -297,7 +280,7 @@ def test_a_message_shorter_than_its_head_is_refused(tmp_path):
         raw = b"\x89MCAP0\r\n" + record(1, struct.pack("<I", 4) + b"ros2" + struct.pack("<I", 0)) + record(6, body)
         path = tmp_path / f"{length}.mcap"
         path.write_bytes(raw + record(15, struct.pack("<I", zlib.crc32(raw))) + b"\x89MCAP0\r\n")
-        with pytest.raises(LogDamaged, match="shorter than its head"):
+        with pytest.raises(LogDamaged, match="shorter than its header"):
             list(walk(path))
 
 
