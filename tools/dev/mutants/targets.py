@@ -47,6 +47,7 @@ SHELLS = (
     Shell(
         "robot_io/ur10/child.py", ("tests/robot_io/ur10/test_ur10_servo.py", "tests/robot_io/ur10/test_ur10_driver.py")
     ),
+    Shell("tools/run/arm_process.py", ("tests/tools/run/test_own_kinds.py",)),
     Shell("tools/run/emulator_process.py", _RUNS),
 )
 SAMPLE = 200
