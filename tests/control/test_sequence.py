@@ -563,6 +563,15 @@ def test_rest_is_less_than_a_centimetre_a_second_for_300_ms(twist, rests):
         assert bench.state.control.phase == Phase.REST
 
 
+def test_a_base_that_is_to_move_does_not_rest_though_it_stands():
+    """Blocked wheels read zero; nothing that waits for rest may count from there."""
+    bench = pushing()
+    for n in range(10):
+        bench.fold(lambda inp, _: replace(inp, base=replace(inp.base, odometry=BodyTwist())), n)
+        assert bench.state.control.speed > 0.0
+        assert bench.state.control.rest_since_ns == 0
+
+
 @pytest.mark.parametrize("phase", [Phase.REST, Phase.CHECK])
 def test_at_rest_the_heading_is_left_alone(phase):
     """Nothing may move while it rests, in contact or out of it: a heading that is off is held only on the way."""

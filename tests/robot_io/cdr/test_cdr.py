@@ -261,6 +261,21 @@ class Flags(msgspec.Struct, frozen=True):
     last: Annotated[int, "uint8"]
 
 
+class Switches(msgspec.Struct, frozen=True):
+    """Bools and nothing else."""
+
+    one: bool
+    two: bool
+
+
+def test_a_bool_of_two_among_bools_alone_is_refused():
+    switches = CdrType(Switches, "push_msgs/msg/Switches")
+    assert switches.decode(b"\0\1\0\0\1\0") == Switches(True, False)
+    for payload in (b"\0\1\0\0\2\0", b"\0\1\0\0\1\xff"):
+        with pytest.raises(LogDamaged):
+            switches.decode(payload)
+
+
 class Padded(msgspec.Struct, frozen=True):
     """Padding and no bool: 0 to 7 bytes before the double, by the length of the text."""
 

@@ -124,7 +124,19 @@ def test_nothing_that_moves_leaves_on_a_link_that_was_quiet_for_100_ms(ends, qui
     assert base.command(twist) == (twist if moves else BodyTwist())
     assert base.health().counters["held_back"] == (0 if moves else 1)
     assert base.command(BodyTwist()) == BodyTwist()
+    assert base.health().counters["held_back"] == (0 if moves else 1), "a zero is never held back"
     assert base.health().counters["sent"] == 2
+
+
+def test_a_link_on_which_nobody_has_looked_is_not_quiet(ends):
+    """A message waits in the socket: whoever has not drained for 150 ms still drives."""
+    link, bridge = ends
+    bridge.sendall(frame(TEXT, b'{"op":"publish","topic":"/somebody","msg":{}}'))
+    assert link.wait_readable(time.monotonic_ns() + 2_000_000_000)
+    base = Ridgeback(URL)
+    base._link, base._started, base._state = link, True, LinkState.UP
+    base.newest_inbound_ns = time.monotonic_ns() - 150_000_000
+    assert base.command(BodyTwist(0.1, 0.0, 0.0)) == BodyTwist(0.1, 0.0, 0.0)
 
 
 def test_a_wait_ends_in_time_however_much_still_comes(ends):

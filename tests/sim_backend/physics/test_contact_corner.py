@@ -55,6 +55,43 @@ def test_a_corner_the_contact_slides_over_continues_on_the_next_face():
     assert len(normals) == 2  # first the left face's, then the slanted one's
 
 
+OBTUSE = (-0.5, -0.1), (-0.5, -0.6), (0.5, -0.6), (0.5, 0.5)
+"""Its first corner's faces are the left one, inward normal (1, 0), and the slanted one, (0.6, -1) made unit."""
+SLANTED = (0.6 / math.hypot(0.6, 1.0), -1.0 / math.hypot(0.6, 1.0))
+
+
+def corner_velocity(fx, fy, d=0.3):
+    """Velocity of the first corner under a force there: v + w x c, with v along the force and w = (c x f) / d^2."""
+    cx, cy = OBTUSE[0]
+    turn = (cx * fy - cy * fx) / d**2
+    return fx - turn * cy, fy + turn * cx
+
+
+@pytest.mark.parametrize(
+    ("force_deg", "normal", "beyond_deg"),
+    [
+        (6.0, (1.0, 0.0), 6.0),
+        (-65.0, SLANTED, 65.0 - math.degrees(math.atan2(1.0, 0.6))),
+        (-30.0, (math.cos(math.radians(30)), -math.sin(math.radians(30))), 0.0),
+    ],
+)
+def test_a_force_beyond_both_normals_sticks_by_the_friction_of_the_nearer_face(force_deg, normal, beyond_deg):
+    """Sticking at the corner needs the force within the friction cone of some normal between the two faces'."""
+    fx, fy = math.cos(math.radians(force_deg)), math.sin(math.radians(force_deg))
+    rows = Outline(ConvexPolygon(OBTUSE)).rows
+    vx, vy = corner_velocity(fx, fy)
+    needed = math.tan(math.radians(beyond_deg))
+    motion, nx, ny, face = solve_at_corner(rows, 0, solve_exact, vx, vy, (-0.5, -0.1, 0.3, 2.0, needed + 0.01, None))
+    assert (motion.mode, face) == (Sliding.STICKING, -1)
+    assert (nx, ny) == pytest.approx(normal, abs=1e-9)
+    assert (motion.fx / math.hypot(motion.fx, motion.fy), motion.fy / math.hypot(motion.fx, motion.fy)) == (
+        pytest.approx((fx, fy), abs=1e-9)
+    )
+    if beyond_deg:
+        sliding = solve_at_corner(rows, 0, solve_exact, vx, vy, (-0.5, -0.1, 0.3, 2.0, needed - 0.01, None))
+        assert sliding is None or sliding[0].mode is not Sliding.STICKING
+
+
 def test_first_touch_right_on_a_corner_does_not_choke():
     model = SliderModel(Rectangle(1, 1), 1.0, 0.38, 0.0)
     slider = PushedSlider(model, (0.0, 0.0, math.pi / 4), 0.0)

@@ -70,6 +70,15 @@ def test_a_disc_whose_centre_of_friction_is_off_tips_that_much_earlier():
         Floor(off, "uniform", FloorEffects(shift_m=0.1501))
 
 
+def test_a_wedge_tips_over_its_nearest_side_and_nothing_is_shifted_back():
+    """The slanted side runs through (0.4, -0.2) and (-0.2, 0.4): from (0, 0.1) it is 0.1 / sqrt(2) = 0.0707 m away."""
+    wedge = SliderModel(ConvexPolygon(((-0.2, -0.2), (0.4, -0.2), (-0.2, 0.4))), 1.0, 0.1, 0.3, cof_m=(0.0, 0.1))
+    Floor(wedge, "uniform", FloorEffects(shift_m=0.0706))
+    for shift_m in (0.0708, -0.001):
+        with pytest.raises(ConfigError, match="tips"):
+            Floor(wedge, "uniform", FloorEffects(shift_m=shift_m))
+
+
 def test_a_box_whose_centre_of_friction_is_off_tips_that_much_earlier():
     """0.4 m long and 0.6 m wide, its load 0.05 m ahead and 0.15 m to the left: 0.15 m to the nearest side."""
     Floor(off := SliderModel(Rectangle(0.4, 0.6), 1.0, 0.1, 0.3, cof_m=(0.05, 0.15)), "uniform", FloorEffects())
