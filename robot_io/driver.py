@@ -4,9 +4,10 @@
 returns all new samples since the last call, oldest first, bounded, and never blocks and never raises on
 link loss (it gives what came before, then nothing, and `health` says LOST). `stop` and `close` are idempotent,
 bounded and never raise. A driver stamps arrivals; it never judges staleness and never resumes motion by itself.
+It starts no threads and takes no locks: use it from one thread, the one that opened it.
 
 A rig names a driver by its `kind`; `from_rig` then builds it. A driver outside this project keeps the protocol of its
-device (`Sensor`, `Arm` or `Base`); deriving from `DriverBase` gives it `with`.
+device (`Sensor`, `Base`, or for an arm `Driver` of `JointState` samples); deriving from `DriverBase` gives it `with`.
 """
 
 from __future__ import annotations
@@ -25,9 +26,10 @@ SampleT = TypeVar("SampleT")
 
 
 class SensorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a force-torque sensor declares: six numbers each for fx, fy, fz (N) and mx, my, mz (N*m), SENSOR frame.
+    """What a force-torque sensor declares of itself.
 
-    Safety, tare and settings go by these. All must be finite and above 0; the rate is 50 to 8000 Hz.
+    Six numbers are those of fx, fy, fz (N) and mx, my, mz (N*m) in the SENSOR frame. Safety, tare and settings go by
+    these. All must be finite and above 0; the rate is 50 to 8000 Hz.
     """
 
     range: Vector6
@@ -55,11 +57,14 @@ class Driver(Protocol[SampleT]):
         ...
 
     def open(self) -> DeviceInfo:
-        """Connect and identify. Raises DeviceUnreachable, DeviceProtocolError or DeviceNotReady."""
+        """Connect and identify, within a time the driver names.
+
+        Raises DeviceUnreachable, DeviceProtocolError or DeviceNotReady.
+        """
         ...
 
     def start(self) -> None:
-        """Begin the flow of samples. Raises DeviceError when the device refuses."""
+        """Begin the flow of samples, within a time the driver names. Raises DeviceError when the device refuses."""
         ...
 
     def drain(self) -> tuple[Stamped[SampleT], ...]:
@@ -67,7 +72,7 @@ class Driver(Protocol[SampleT]):
         ...
 
     def health(self) -> DeviceHealth:
-        """Return link state, cause and counters."""
+        """Return link state, cause, counters and rate (Hz). Never blocks, never raises."""
         ...
 
     def stop(self) -> None:
@@ -80,9 +85,10 @@ class Driver(Protocol[SampleT]):
 
 
 class Sensor(Driver[SensorWrench], Protocol):
-    """A force-torque sensor. Its health counts at least `packets_ok`."""
+    """A force-torque sensor: a `Driver` of `SensorWrench` samples. Its health counts at least `packets_ok`."""
 
     facts: ClassVar[SensorFacts]
+    """What the sensor declares of itself."""
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when samples wait, or raise OSError when it is closed."""
@@ -90,7 +96,7 @@ class Sensor(Driver[SensorWrench], Protocol):
 
 
 class Base(Driver[BaseFeed], Protocol):
-    """A mobile base that takes velocities."""
+    """A mobile base: a `Driver` of `BaseFeed` samples that takes velocities, too."""
 
     before_close: Callable[[int], None] | None
     """Called with the descriptor just before it is closed, so that nobody waits on it any more."""

@@ -20,12 +20,15 @@ Vector6 = tuple[float, float, float, float, float, float]
 
 
 class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
-    """A value with its sequence number, its arrival (CLOCK_MONOTONIC ns) and the device's own time (s, NaN if none)."""
+    """A sample with the time at which it came."""
 
     value: T
     seq: int
+    """Counts samples of this kind; a number that is missing is a sample that was dropped."""
     received_ns: int
+    """When it arrived, CLOCK_MONOTONIC."""
     device_time_s: float = float("nan")
+    """The device's own time (s), NaN where it gives none."""
 
 
 class SensorWrench(msgspec.Struct, frozen=True, gc=False):
@@ -64,6 +67,7 @@ class Pose2D(msgspec.Struct, frozen=True, gc=False):
 
 
 Joints = Vector6
+"""Six joints of an arm: base, shoulder, elbow, wrist 1, 2, 3 (rad or rad/s)."""
 
 
 class ArmState(IntEnum):
@@ -87,19 +91,25 @@ class JointState(msgspec.Struct, frozen=True, gc=False):
     """State of the arm: rad, rad/s, an `ArmState`, and the time of its controller (s)."""
 
     position: Joints
+    """Base, shoulder, elbow, wrist 1, 2, 3 (rad)."""
     velocity: Joints
+    """The same joints (rad/s)."""
     state: int
+    """An `ArmState`."""
     device_state: int
     """The controller's own modes, packed by its driver: for the log and its maker's manual, judged by nobody."""
     controller_time_s: float
 
 
 class BaseStatus(msgspec.Struct, frozen=True, gc=False):
-    """What the Ridgeback's microcontroller reports: stop pressed, motors driven, battery in volt."""
+    """What the Ridgeback's microcontroller reports."""
 
     stop_engaged: bool
+    """A stop is pressed."""
     drivers_active: bool
+    """The motors are driven."""
     battery_v: float
+    """Volt."""
 
 
 class LinkState(IntEnum):
@@ -113,22 +123,27 @@ class LinkState(IntEnum):
 
 
 class DeviceInfo(msgspec.Struct, frozen=True, gc=False):
-    """Identity a device gave when it was opened: kind, where, model, firmware or version, serial."""
+    """Identity that a device gave when it was opened."""
 
     device: str
     where: str
+    """Port, host or address."""
     model: str = ""
     version: str = ""
+    """Of its firmware or software."""
     serial: str = ""
 
 
 class DeviceHealth(msgspec.Struct, frozen=True, gc=False):
-    """Link state, its cause in words ("" when up), and counters by name (monotonic ints) and rate in Hz."""
+    """How a device's link is, as its driver sees it."""
 
     state: LinkState
     cause: str
+    """Why, in words; "" when it is up."""
     counters: dict[str, int]
+    """What the driver counts, by name; they only grow while it is open."""
     rate_hz: float
+    """Samples a second of late, 0 where there are none."""
 
 
 class BasePose(msgspec.Struct, frozen=True, gc=False, tag=True):
@@ -169,6 +184,7 @@ class CommandEcho(msgspec.Struct, frozen=True, gc=False, tag=True):
 
 
 BaseFeed = BasePose | BaseOdometry | BaseReport | SliderPose | CommandEcho
+"""What a base gives: every sample is one of these."""
 
 
 ZERO_JOINTS: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 from robot_io._lazy import exports
 
 if TYPE_CHECKING:
-    from robot_io.ft300.driver import Ft300
+    from robot_io.ft300.driver import Ft300, Ft300Reading
 
-__all__ = ["Ft300"]
+__all__ = ["Ft300", "Ft300Reading"]
 
 __getattr__ = exports(
     __name__,
     {
         "Ft300": "driver",
+        "Ft300Reading": "driver",
     },
 )

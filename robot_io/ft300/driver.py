@@ -1,13 +1,5 @@
 """Driver of the Robotiq FT 300 force-torque sensor (also FT 150 and FT 300-S, which speak the same protocol).
 
-Alone, in five lines:
-
-    with Ft300("/dev/serial/by-id/usb-FTDI_...") as sensor:
-        while True:
-            select.select([sensor], [], [])
-            for sample in sensor.drain():
-                print(sample.value)
-
 The sensor speaks Modbus RTU until it is told to stream; then it sends 100 packets a second and answers nothing
 until it hears 0xFF for long enough. Values are raw: bias and tool weight are in them. A sample is stamped when
 its last byte was read, 8.3 ms of line time (and up to the USB adapter's latency timer) after it was measured.
@@ -43,17 +35,28 @@ RATE_SAMPLES = 101
 
 
 class Ft300Reading(msgspec.Struct, frozen=True, gc=False):
-    """What `Ft300.probe` reads: identity, one raw wrench, acceleration in g (SENSOR frame, NaN if not given)."""
+    """What `Ft300.probe` reads."""
 
     info: DeviceInfo
+    """Identity: model, firmware and serial number."""
     wrench: SensorWrench
+    """One raw wrench."""
     acceleration_g: tuple[float, float, float]
+    """Acceleration in g along x, y, z of the SENSOR frame; NaN where the sensor does not give it."""
 
 
 class Ft300(DriverBase):
-    """FT 300 at `port`: a device path, a pty or `socket://host:port`; `clock` stamps the samples (ns)."""
+    """An FT 300 on a serial line: 100 samples a second of force (N) and torque (N*m), raw, in the SENSOR frame.
+
+    port: a device path (best one of /dev/serial/by-id), a pty, or `socket://host:port` for a serial server.
+    clock: stamps the samples, in ns; CLOCK_MONOTONIC unless a test brings its own.
+
+    Nothing is opened before `open`. For one thread at a time, and it starts none; to wait for samples, `select` on the
+    driver itself.
+    """
 
     facts: ClassVar[SensorFacts] = FT300_FACTS
+    """What the sensor declares of itself: range, rate, resolution and noise, from its data sheet."""
 
     def __init__(self, port: str, *, clock: ClockNs = monotonic_ns) -> None:
         self._port = port
@@ -138,7 +141,12 @@ class Ft300(DriverBase):
         return tuple(samples[-MAX_SAMPLES_PER_DRAIN:])
 
     def health(self) -> DeviceHealth:
-        """Return link state, its cause, counters, and the rate over the last 100 samples (0 after 1 s without)."""
+        """Return link state, its cause, counters, and the rate (Hz) over the last 100 samples (0 after 1 s without).
+
+        Counters since the driver was made: `packets_ok`, `crc_fail`, `junk_bytes`, `resyncs`, `bursts` (several
+        packets in one read), `empty_reads`, `overflow` (samples dropped), `long_gaps` (over 35 ms), `max_gap_us`,
+        `beyond_range`.
+        """
         parser = self._parser
         counters = {
             "packets_ok": parser.packets_ok,

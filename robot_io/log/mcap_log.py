@@ -35,7 +35,11 @@ LATCHED_QOS = (
 
 
 class McapLog:
-    """A log being written. `config_text` is attached as config.toml, `metadata` are the facts of the run.
+    """A log being written.
+
+    path: where it goes; nothing may be there yet.
+    config_text: attached as config.toml.
+    metadata: the facts of the run.
 
     Raises UsageError when `path` exists, EnvironmentFault when it cannot be created. Errors of the disk while
     writing come out as OSError; the file then ends at the last flush, and only `abandon` makes sense.

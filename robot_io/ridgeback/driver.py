@@ -1,10 +1,5 @@
 """Driver of the Clearpath Ridgeback over rosbridge (v2, websocket): velocity out; pose, odometry, status in.
 
-    with Ridgeback("ws://192.168.131.1:9090") as base:
-        base.command(BodyTwist(0.05, 0.0, 0.0))
-        for sample in base.drain():
-            print(sample)
-
 One thread, never blocking after `start`: call `drain` when `fileno()` is readable and at least every 20 ms.
 What the bridge gets wrong is handled here: it never reports an error (checked beforehand by
 `preflight`, and by hearing our own commands back), it delivers old commands after a hang (nothing
@@ -61,12 +56,18 @@ ZERO = BodyTwist()
 
 
 class Ridgeback(DriverBase):
-    """The base: give it velocities in the BODY frame, drain `Stamped[BaseFeed]` samples from it.
+    """A Ridgeback behind rosbridge: takes velocities (m/s, rad/s, BODY frame), gives pose, odometry and status.
 
-    `pose_source`: which topic says where the base is. `base_from_marker`: x (m), y (m), yaw (rad) of the motion
-    capture's marker frame in the BODY frame. `before_close` is called with the descriptor just before the socket
-    is closed, also when the link is given up: an event loop must forget it then.
-    Raises ConfigError when the topics cannot serve the pose source.
+    url: `ws://host:port` of the bridge; `wss` is not spoken.
+    topics: names and types of the base's ROS topics.
+    pose_source: which topic says where the base is: `"mocap"`, `"odometry"` or `"joint_states"`.
+    base_from_marker: x (m), y (m), yaw (rad) of the motion capture's marker frame in the BODY frame.
+    clock: stamps the samples and judges the link, in ns; CLOCK_MONOTONIC unless a test brings its own.
+    before_close: called with the descriptor just before the socket is closed, also when the link is given up: an event
+        loop must forget it then.
+
+    Raises ConfigError: an address that is none, or topics that cannot serve the pose source. For one thread at a time,
+    and it starts none.
     """
 
     def __init__(
@@ -117,9 +118,10 @@ class Ridgeback(DriverBase):
         return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
-        """Connect, check topics, advertise, subscribe; at most 3.5 s.
+        """Connect, check topics, advertise, subscribe; at most 3.5 s. Nothing is commanded.
 
-        Raises DeviceUnreachable, DeviceProtocolError (no bridge, wrong message type), DeviceNotReady.
+        Raises DeviceUnreachable (nothing listens, no handshake, the link broke), DeviceProtocolError (no bridge, wrong
+        message type) or DeviceNotReady (nobody listens to the command topic).
         """
         self.close()
         self._reset()
@@ -168,7 +170,10 @@ class Ridgeback(DriverBase):
         return -1 if self._link is None else self._link.fileno()
 
     def drain(self) -> tuple[Stamped[BaseFeed], ...]:
-        """Return every new sample, oldest first (`seq` counts per kind); also keeps the link alive and judged."""
+        """Return every new sample, oldest first (`seq` counts per kind); also keeps the link alive and judged.
+
+        At most 4096; older ones are dropped and counted. Never blocks, never raises; call it at least every 20 ms.
+        """
         now_ns = self._clock()  # before looking: what a pause of this process kept waiting is no silence
         self._receive()
         self._tend(now_ns)
@@ -180,7 +185,8 @@ class Ridgeback(DriverBase):
         """Send a velocity (m/s, m/s, rad/s, BODY frame); return what was really sent.
 
         Zero is sent instead when the link has been quiet for 0.1 s, and zero is returned when nothing could be sent
-        (`health` says why): the base then stops by its own timeout. Raises ValueError unless finite.
+        (`health` says why): the base then stops by its own timeout. That is 0.25 s after the last command, so a motion
+        goes on only as long as commands do. Never blocks. Raises ValueError unless finite.
         """
         payload = encode_twist(self._topic, self._type, wanted)
         now_ns = self._clock()
@@ -196,20 +202,24 @@ class Ridgeback(DriverBase):
         return wanted if self._send(payload) else ZERO
 
     def health(self) -> DeviceHealth:
-        """Return link state, cause and counters; the rate is that of the pose."""
+        """Return link state, cause and counters; the rate (Hz) is that of the last 100 poses.
+
+        Counters since `open`: `messages`, `undecodable`, `sent`, `held_back` (motion turned into zero on a quiet link),
+        `dropped_samples`, `unanswered_checks`, `pings`, and one for each kind of sample.
+        """
         times = self._pose_times
         span_ns = times[-1] - times[0] if len(times) > 1 else 0
         rate_hz = (len(times) - 1) * NS_PER_S / span_ns if span_ns else 0.0
         return DeviceHealth(self._state, self._cause, {**self._counters, **self._reader.counters}, rate_hz)
 
     def stop(self) -> None:
-        """Send zero three times, if the link still stands."""
+        """Send zero three times, if the link still stands. Never blocks, never raises."""
         for _ in range(3):
             if self._link is not None:
                 self._send(encode_twist(self._topic, self._type, ZERO))
 
     def close(self) -> None:
-        """Close the connection within 0.05 s; the bridge forgets us by itself."""
+        """Close the connection within 0.05 s; the bridge forgets us by itself. Idempotent, never raises."""
         link, self._link = self._link, None
         self._started = False
         if link is not None:

@@ -1,12 +1,7 @@
 """The UR10, held still: its driver, and the reader that the control process uses.
 
-    with Ur10("127.0.0.10") as arm:                 # hold="monitor": nothing is ever sent that could move it
-        time.sleep(0.1)
-        for sample in arm.drain():
-            print(sample.value.position)            # rad
-
-The wheel runs in a child process (`child`) that publishes a shared record; abort, hang and crash of that
-process all look the same from here: the record grows old.
+The `ur_rtde` wheel runs in a child process that publishes a shared record, 125 times a second; abort, hang and crash
+of that process all look the same from here: the record grows old. The child never connects again by itself.
 """
 
 from __future__ import annotations
@@ -67,11 +62,17 @@ class ArmLink:
 
 
 class Ur10(DriverBase):
-    """Driver of a UR10 (CB3, PolyScope 3.15) that holds still. See `Driver` for the contract.
+    """A UR10 (CB3, PolyScope 3.15) that holds still: joint positions (rad) and velocities (rad/s).
 
-    `hold="monitor"` sends nothing that could move the arm; the controller's own position loop holds it.
-    `hold="servo"` commands the joints measured at start, with the controller-side watchdog armed, and refuses
-    to begin while a program plays or more than `held_pose_tolerance_rad` from `held_pose_rad` (rad).
+    host: the controller's name or address; ports 29999 (dashboard) and 30004 (RTDE) are used, for `servo` 30003 too.
+    hold: `"monitor"` sends nothing that could move the arm, and the controller's own position loop holds it;
+        `"servo"` commands the joints measured at the start, with the controller-side watchdog armed, and refuses to
+        begin while a program plays or the arm moves.
+    held_pose_rad: six joints (rad) at which `servo` must find the arm; None: wherever it is.
+    held_pose_tolerance_rad: how far each joint may be from that pose at the start (rad).
+
+    For one thread, the one that calls `open`: the arm's process dies with it. There is no `fileno`: call `drain` at the
+    pace of your loop.
     """
 
     def __init__(
@@ -103,9 +104,12 @@ class Ur10(DriverBase):
         return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
-        """Start the arm's process and wait until it has published (5 s, servo 8 s). Raises DeviceError.
+        """Start the arm's process and wait until it has published; at most 5 s, `servo` 8 s.
 
-        That process dies with the thread that calls this: open the arm in one that lives as long as you need it.
+        Raises DeviceUnreachable (no answer, no packets, not ready in time), DeviceProtocolError (no UR10, another
+        PolyScope), DeviceNotReady (off, stopped by safety; for `servo` also moving, playing a program or elsewhere) or
+        DeviceError (open already). That process dies with the thread that calls this: open the arm in one that lives as
+        long as you need it.
         """
         if self._child is not None:
             raise DeviceError("the arm is already open", where=self.host)
@@ -122,7 +126,10 @@ class Ur10(DriverBase):
             raise
 
     def start(self) -> None:
-        """Let samples through from now on; the arm's process publishes since `open`."""
+        """Let samples through from now on; returns at once, as the arm's process publishes since `open`.
+
+        Raises DeviceError when the arm is not open.
+        """
         if self._child is None:
             raise DeviceError("the arm is not open", where=self.host)
         self._first = self.read() or NO_ARM
@@ -130,13 +137,16 @@ class Ur10(DriverBase):
         self._flowing = True
 
     def read(self) -> ArmRecord | None:
-        """Return the newest record, however old; None before the first."""
+        """Return the newest record, however old (`changed_ns` says how old); None before the first. Never blocks."""
         if self._link is not None:
             self._last = self._link.read() or self._last
         return self._last if self._last.published_ns else None
 
     def drain(self) -> tuple[Stamped[JointState], ...]:
-        """Return the newest state when there is one since the last call (joints in rad), else nothing."""
+        """Return the newest state (rad, rad/s) when there is one since the last call, else nothing.
+
+        At most one: states that came in between are not kept, and missing in `seq`. Never blocks, never raises.
+        """
         record = self.read()
         if not self._flowing or record is None or record.packets == self._drained:
             return ()
@@ -144,7 +154,10 @@ class Ur10(DriverBase):
         return (Stamped(record.joints, record.packets, record.changed_ns, record.joints.controller_time_s),)
 
     def health(self) -> DeviceHealth:
-        """Return the link state as the arm's process last said, LOST when that process is gone."""
+        """Return the link state as the arm's process last said, LOST when that process is gone.
+
+        Counts `packets`; the rate (Hz) is that of the controller's packets since `start`, 125 when all is well.
+        """
         record = self.read() or NO_ARM
         state, cause = LinkState(record.link), ""
         if self._child is None or self._stopped:
@@ -163,7 +176,7 @@ class Ur10(DriverBase):
             self._child.stop(STOP_WITHIN_S)
 
     def close(self) -> None:
-        """Stop and release everything; idempotent."""
+        """Stop, at most 3 s, and release everything. Idempotent."""
         self.stop()
         if self._child is not None:
             self._child.close()

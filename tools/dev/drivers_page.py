@@ -1,168 +1,144 @@
-"""Writes docs/drivers.md, the API of the library, from its docstrings.
+"""Writes docs/drivers.md, the API of the library, from its docstrings; the examples are those of the README.
 
 python -m tools.dev.drivers_page > docs/drivers.md
 """
 
 from __future__ import annotations
 
-import dataclasses
-import enum
+import ast
+import importlib
 import inspect
 import re
 import sys
-import textwrap
-from collections.abc import Callable, Iterator
-from typing import Any
+from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
 
-import msgspec
+from tools.dev.api_markdown import entry, prose
 
-import robot_io.log as log
-from robot_io import Ft300, Ridgeback, Ur10, cdr, clock, driver, errors, messages, open_device, rig
-from robot_io.ft300.driver import Ft300Reading
-from tools.dev.notes import notes_of
+README = Path(__file__).resolve().parents[2] / "README.md"
 
 INTRO = """# The drivers as a library
 
-`robot_io` is usable on its own, in your own environment; the program `push` runs from a checkout only.
+`robot_io` is usable on its own, in an environment of yours; the program `push` runs from a checkout only.
 
-    pip install path/to/checkout            # robot_io and what it imports; nothing named control or tools
+    pip install path/to/checkout                     # robot_io and what it imports; nothing named control or tools
+    pip install git+ssh://git.example.org/push.git    # the same from a git repository of yours
 
-```python
-from robot_io import Ft300
+It is typed (`py.typed`), and importing it loads neither numpy nor a device: each driver is loaded when it is
+first used.
 
-with Ft300("/dev/ttyUSB0") as sensor:
-    for sample in sensor.drain():
-        print(sample.received_ns, sample.value.fz)
-```
-
-What holds for every driver:
+## What holds for every driver
 
 - **Order.** `open` identifies the device and `start` begins the flow; `with` does both, and `stop` and `close` at the
-  end. `stop` and `close` are idempotent and never raise. A closed driver can be opened again.
-- **Timing.** Only `open`, `start` and `stop` wait, each for a time that its text names. `drain`, `command` and
-  `health` return at once. Drain at least every 20 ms (`select` on `fileno()` where there is one); what does not fit
-  into the driver's bounded buffers is dropped, oldest first, and counted.
-- **Threads.** A driver belongs to the thread that opened it and starts none of its own. The UR10's connection lives
-  in a child process, which dies with the thread that opened it.
-- **Units.** SI: N, N\\*m, m, rad, s. `received_ns` is CLOCK_MONOTONIC (`time.monotonic_ns`).
-- **Errors.** `open` and `start` raise errors of one tree (below), each with `what`, `where` and `do`. A link that is
-  lost later raises nothing: `drain` returns nothing more, `health` says `LOST` and why. A driver never comes back by
-  itself.
-- **Emulators.** `push emulate ft300`, `ur10` or `ridgeback` in a checkout serves the real bytes to any client.
+  end. `stop` and `close` may be called again and never raise. A closed driver can be opened again.
+- **Timing.** Only `open`, `start`, `stop` and `close` (and the sensor's `probe`) wait, each for a time that its text
+  names. `drain`, `command` and `health` return at once. Drain at least every 20 ms (`select` on the driver where it has
+  a `fileno`); what does not fit into a driver's bounded buffer is dropped, oldest first, and counted.
+- **Threads.** A driver starts no threads and takes no locks: use it from the thread that opened it. The UR10's
+  connection lives in a child process, which dies with that thread.
+- **Units and frames.** SI: N, N\\*m, m, rad, s; the unit is in the name where there could be a doubt. Frames:
+  [frames and signs](frames-and-signs.md). `received_ns` is CLOCK_MONOTONIC (`time.monotonic_ns`).
+- **Errors.** `open` and `start` raise errors of [one tree](#errors), each with `what`, `where` and `do`. A link that is
+  lost later raises nothing: `drain` gives nothing more, `health` says `LOST` and why. A driver never comes back by
+  itself: open it again.
+- **Emulators.** No device? `push emulate ft300`, `ur10` or `ridgeback` in a checkout serves the real bytes to any
+  client.
 """
 
-# fmt: off
-PARTS: list[tuple[str, list[Any]]] = [
-    ("Drivers", [Ft300, Ft300Reading, Ur10, Ridgeback, open_device]),
-    (
-        "Writing a driver",
-        [driver.SensorFacts, driver.Driver, driver.Sensor, driver.Base, driver.DriverBase, driver.no_more_options],
+
+class Part(NamedTuple):
+    """A section: public names of one module."""
+
+    title: str
+    module: str
+    names: tuple[str, ...]
+    text_of: str = ""
+    """Module whose docstring introduces the section, but for its first line."""
+    example: str = ""
+    """Class by which the README's example is found."""
+    more: str = ""
+
+
+PARTS = (
+    Part("Force-torque sensor", "robot_io.ft300", ("Ft300", "Ft300Reading"), "robot_io.ft300.driver", "Ft300"),
+    Part("Held arm", "robot_io.ur10", ("Ur10",), "robot_io.ur10.driver", "Ur10"),
+    Part("Mobile base", "robot_io.ridgeback", ("Ridgeback",), "robot_io.ridgeback.driver", "Ridgeback"),
+    Part(
+        "Devices by kind",
+        "robot_io.kinds",
+        ("open_device", "build_driver", "find_kind"),
+        more="A rig names each device by its kind: a shipped name, or a class of your own ([how](add-a-device.md)).\n"
+        "`open_device` is in `robot_io` itself, too, as the three drivers are.",
     ),
-    (
+    Part(
+        "The contract of a driver",
+        "robot_io.driver",
+        ("Driver", "Sensor", "Base", "SensorFacts", "DriverBase", "no_more_options"),
+        "robot_io.driver",
+    ),
+    Part(
         "Messages",
-        [
-            messages.Stamped, messages.SensorWrench, messages.JointState, messages.ArmState, messages.ArmRecord,
-            messages.ArmError, messages.BasePose, messages.BaseOdometry, messages.BaseReport, messages.SliderPose,
-            messages.CommandEcho, messages.BaseStatus, messages.Pose2D, messages.BodyTwist, messages.WorldTwist,
-            messages.LinkState, messages.DeviceInfo, messages.DeviceHealth,
-        ],
+        "robot_io.messages",
+        (
+            *("Stamped", "SensorWrench", "JointState", "Joints", "ArmState", "ArmRecord", "ArmError"),
+            *("BaseFeed", "BasePose", "BaseOdometry", "BaseReport", "BaseStatus", "SliderPose", "CommandEcho"),
+            *("BaseRecord", "BodyTwist", "WorldTwist", "Pose2D", "DeviceInfo", "DeviceHealth", "LinkState"),
+        ),
+        "robot_io.messages",
     ),
-    ("Time", [clock.monotonic_ns, clock.VirtualClock]),
-    ("Rig files", [rig.load_rig, rig.rig_to_toml, rig.rig_from_toml, rig.shipped_rigs]),
-    ("Logs", [log.read_log, log.read_summary, log.LogMessage, log.LogSummary, log.recover]),
-    ("ROS 2 messages as bytes", [cdr.CdrType, cdr.type_from_schema]),
-]
-# fmt: on
+    Part(
+        "Rig files",
+        "robot_io.rig",
+        ("load_rig", "shipped_rigs", "rig_to_toml", "rig_from_toml", "RigConfig", "TopicsConfig"),
+        more="Every setting with its range and default: [rig files](rig-files.md).",
+    ),
+    Part(
+        "Logs",
+        "robot_io.log",
+        ("read_log", "read_summary", "LogMessage", "LogSummary", "recover", "McapLog", "CHANNELS", "Kind"),
+        more="What is in a log: [logs](logs.md).",
+    ),
+    Part("ROS 2 messages as bytes", "robot_io.cdr", ("CdrType", "type_from_schema"), "robot_io.cdr.cdr_type"),
+    Part("Time", "robot_io.clock", ("monotonic_ns", "VirtualClock"), "robot_io.clock"),
+    Part("Errors", "robot_io.errors", ("PushError",), "robot_io.errors"),
+)
 
 
 def page() -> str:
     """Return the page."""
-    parts = [INTRO]
-    for title, members in PARTS:
-        parts.append(f"\n## {title}\n")
-        parts += [_entry(member) for member in members]
-    tree = inspect.cleandoc(errors.__doc__ or "")
-    parts.append(f"\n## Errors\n\n`robot_io.errors`: {tree}\n")
+    linked = {name for part in PARTS for name in part.names}
+    contents = " · ".join(f"[{part.title}](#{part.title.lower().replace(' ', '-')})" for part in PARTS)
+    parts = [INTRO, f"The rest of this page, by room: {contents}.\n"]
+    for part in PARTS:
+        members = ", ".join(f"[{name}](#{name.lower()})" for name in part.names)
+        parts.append(f"## {part.title}\n\nIn `{part.module}`: {members}.\n")
+        parts += [f"{part.more}\n"] if part.more else []
+        parts += [_example(part.example)] if part.example else []
+        parts += [_introduction(part.text_of)] if part.text_of else []
+        module = importlib.import_module(part.module)
+        parts += [entry(name, _home(module, name), linked) for name in part.names]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(parts)).rstrip() + "\n"
 
 
-def _entry(member: Any) -> str:
-    if not inspect.isclass(member):
-        return f"### {_heading(member, member.__name__)}\n\n{_text(member)}\n"
-    lines = [f"### {_heading(member, member.__name__)}\n\n{_text(member)}\n"]
-    notes = _notes(member)
-    if issubclass(member, enum.Enum):
-        lines += [f"- `{item.name}` = {item.value}{_said(notes.get(item.name))}" for item in member]
-    elif issubclass(member, msgspec.Struct):
-        lines += _fields([field.name for field in msgspec.structs.fields(member)], notes)
-    elif _is_protocol(member):
-        lines += _fields([name for name in member.__annotations__ if not name.startswith("_")], notes)
-    lines += [
-        f"- **`{name}{_signature(method)}`**: {textwrap.indent(_text(method), '  ').strip()}"
-        for name, method in _methods(member)
-    ]
-    return "\n".join(lines) + "\n"
+def _home(room: ModuleType, name: str) -> ModuleType:
+    """Return the module that defines what a room exports: the one that the room's type checker is told."""
+    for node in ast.walk(ast.parse(inspect.getsource(room))):
+        if isinstance(node, ast.ImportFrom) and name in (found.name for found in node.names):
+            return importlib.import_module(str(node.module))
+    return room
 
 
-def _fields(names: list[str], notes: dict[str, str]) -> list[str]:
-    """Return a line for each field that needs a word, or one line for all."""
-    if not any(name in notes for name in names):
-        return [f"Fields: {', '.join(f'`{name}`' for name in names)}."] if names else []
-    return [f"- `{name}`{_said(notes.get(name))}" for name in names]
+def _example(name: str) -> str:
+    blocks = re.findall(r"```python\n.*?```\n", README.read_text(encoding="utf-8"), re.S)
+    [found] = [block for block in blocks if f" {name}(" in block]
+    return str(found)
 
 
-def _methods(member: type[Any]) -> Iterator[tuple[str, Callable[..., Any]]]:
-    for name, found in vars(member).items():
-        method = found.__func__ if isinstance(found, classmethod | staticmethod) else found
-        if name.startswith("_") or not inspect.isfunction(method) or not method.__doc__:
-            continue
-        yield name, method
-
-
-def _heading(member: Any, name: str) -> str:
-    where = member.__module__.removesuffix(".driver") if name in ("Ft300", "Ur10", "Ridgeback") else member.__module__
-    if inspect.isclass(member) and (issubclass(member, enum.Enum | msgspec.Struct) or _is_protocol(member)):
-        return f"`{where}.{name}`"
-    return f"`{where}.{name}{_signature(member)}`"
-
-
-def _is_protocol(member: type[Any]) -> bool:
-    return bool(getattr(member, "_is_protocol", False)) or dataclasses.is_dataclass(member)
-
-
-def _signature(member: Any) -> str:
-    """Return the parameters with their defaults, without self and without types (the text says the units)."""
-    shown = []
-    starred = False
-    for name, parameter in inspect.signature(member).parameters.items():
-        if name in ("self", "cls"):
-            continue
-        if parameter.kind is parameter.KEYWORD_ONLY and not starred:
-            starred = True
-            shown.append("*")
-        default = "" if parameter.default is parameter.empty else f"={_value(parameter.default)}"
-        shown.append(name + default)
-    return f"({', '.join(shown)})"
-
-
-def _value(default: Any) -> str:
-    if inspect.isfunction(default):
-        return default.__name__
-    return f"{type(default).__name__}()" if isinstance(default, msgspec.Struct) else repr(default)
-
-
-def _text(member: Any) -> str:
-    return inspect.cleandoc(member.__doc__ or "")
-
-
-def _notes(member: type[Any]) -> dict[str, str]:
-    """Return the text below each field or enum's member of a class."""
-    found = notes_of(sys.modules[member.__module__])
-    return {field: text for (name, field), text in found.items() if name == member.__name__}
-
-
-def _said(note: str | None) -> str:
-    return f": {note}" if note else ""
+def _introduction(module: str) -> str:
+    """Return a module's docstring as Markdown, but for its first line, which says what the title says."""
+    doc = inspect.getdoc(importlib.import_module(module)) or ""
+    return prose(doc.partition("\n")[2])
 
 
 if __name__ == "__main__":
