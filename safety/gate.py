@@ -105,7 +105,7 @@ def on_frame(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, 
 def on_frames(limits: EnvelopeLimits, state: GateState, frames: Sequence[GateFrame | None], now_ns: int) -> GateState:
     """Judge all frames that were waiting, oldest first; only the newest must be fresh.
 
-    When the gate itself was held up for a moment, control's older frames waited: that is no fault of theirs.
+    When the gate itself was held up for a moment, control's older frames waited: that is not their fault.
     """
     for frame in frames[:-1]:
         state = on_frame(limits, state, frame, now_ns if frame is None else min(frame.sent_ns, now_ns))

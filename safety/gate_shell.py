@@ -72,7 +72,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
     def on_frames(self, frames: Sequence[GateFrame | None], began_ns: int, read_ns: int) -> GateShell:
         """Judge the frames that waited (None: nonsense), oldest first, read from `began_ns` to `read_ns`.
 
-        A pause of the gate in between makes no frame old, and is no silence of control.
+        A pause of the gate in between makes no frame old, and is not silence of control.
         """
         if not frames:
             return self

@@ -18,7 +18,7 @@ def is_tcp_address(port: str) -> bool:
     try:
         parts = urlsplit(port)
         return port.startswith(SCHEME) and bool(parts.hostname and parts.port) and port == f"{SCHEME}{parts.netloc}"
-    except ValueError:  # a port that is no number, or beyond 65535
+    except ValueError:  # a port that is not a number, or beyond 65535
         return False
 
 

@@ -27,7 +27,7 @@ class ExactStream(ReadDataStream):
         self._size = len(body)
 
     def read(self, length: int) -> bytes:
-        """Return exactly so many bytes. Raises EndOfFile."""
+        """Return exactly this many bytes. Raises EndOfFile."""
         if length > self._size - self.count:
             raise EndOfFile
         return super().read(length)

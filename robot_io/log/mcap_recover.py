@@ -33,7 +33,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
     if out_path.exists():
         raise UsageError("there is already a file of this name", where=str(out_path), do="Give another name with --out")
     items = walk(path, finished=False)
-    first = next(items)  # the header; nothing is created for a file that is no log
+    first = next(items)  # the header; nothing is created for a file that is not a log
     assert isinstance(first, Header)
     stream = create_new(out_path)
     try:

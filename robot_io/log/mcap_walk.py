@@ -65,7 +65,7 @@ class Topic(NamedTuple):
 LogItem = Header | Topic | Message | Attachment | Metadata
 
 Grown = Callable[[int], int]
-"""Waits until a log has at least so many bytes or is no longer written, and returns its size."""
+"""Waits until a log has at least this many bytes or is no longer written, and returns its size."""
 
 
 def walk(path: Path, *, finished: bool = True, grown: Grown | None = None) -> Iterator[LogItem]:

@@ -272,7 +272,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
     if path.resolve() in seen:
         raise ConfigError("this rig extends itself", where=str(path))
     try:
-        text = path.read_text(encoding="utf-8-sig")  # a byte order mark, as some editors write, is no mistake
+        text = path.read_text(encoding="utf-8-sig")  # a byte order mark, as some editors write, is not a mistake
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot read it: {error}", where=str(path)) from None
     data, origins = toml_text.parse(text, str(path))

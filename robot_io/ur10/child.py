@@ -49,7 +49,7 @@ _CAUSE = {
 }
 
 RECEIVER_PRIORITY = 60
-"""SCHED_FIFO priority of the wheel's own thread, which starved for 40 ms looks like a controller that stands still.
+"""SCHED_FIFO priority of the wheel's own thread, which starved for 40 ms looks like a controller that has stopped.
 
 Below every priority of this program, because that thread is not ours."""
 
