@@ -60,13 +60,20 @@ OBTUSE = (-0.5, -0.1), (-0.5, -0.6), (0.5, -0.6), (0.5, 0.5)
 SLANTED = (0.6 / math.hypot(0.6, 1.0), -1.0 / math.hypot(0.6, 1.0))
 
 
-def corner_velocity(fx, fy, d=0.3):
-    """Velocity of the first corner under a force there: v + w x c, with v along the force and w = (c x f) / d^2."""
-    cx, cy = OBTUSE[0]
+def turned(x, y, deg):
+    """Turn a vector; what sticks does so whichever way the slider lies."""
+    cos, sin = math.cos(math.radians(deg)), math.sin(math.radians(deg))
+    return cos * x - sin * y, sin * x + cos * y
+
+
+def corner_velocity(corner, force, d=0.3):
+    """Velocity of a corner under a force there: v + w x c, with v along the force and w = (c x f) / d^2."""
+    (cx, cy), (fx, fy) = corner, force
     turn = (cx * fy - cy * fx) / d**2
     return fx - turn * cy, fy + turn * cx
 
 
+@pytest.mark.parametrize("lies_deg", [0.0, 70.0, 160.0, 250.0])
 @pytest.mark.parametrize(
     ("force_deg", "normal", "beyond_deg"),
     [
@@ -75,20 +82,24 @@ def corner_velocity(fx, fy, d=0.3):
         (-30.0, (math.cos(math.radians(30)), -math.sin(math.radians(30))), 0.0),
     ],
 )
-def test_a_force_beyond_both_normals_sticks_by_the_friction_of_the_nearer_face(force_deg, normal, beyond_deg):
+def test_a_force_beyond_both_normals_sticks_by_the_friction_of_the_nearer_face(force_deg, normal, beyond_deg, lies_deg):
     """Sticking at the corner needs the force within the friction cone of some normal between the two faces'."""
-    fx, fy = math.cos(math.radians(force_deg)), math.sin(math.radians(force_deg))
-    rows = Outline(ConvexPolygon(OBTUSE)).rows
-    vx, vy = corner_velocity(fx, fy)
+    points = tuple(turned(*point, lies_deg) for point in OBTUSE)
+    force = turned(1.0, 0.0, force_deg + lies_deg)
+    velocity = corner_velocity(points[0], force)
     needed = math.tan(math.radians(beyond_deg))
-    motion, nx, ny, face = solve_at_corner(rows, 0, solve_exact, vx, vy, (-0.5, -0.1, 0.3, 2.0, needed + 0.01, None))
+
+    def answer(friction):
+        rows = Outline(ConvexPolygon(points)).rows
+        return solve_at_corner(rows, 0, solve_exact, *velocity, (*points[0], 0.3, 2.0, friction, None))
+
+    motion, nx, ny, face = answer(needed + 0.01)
     assert (motion.mode, face) == (Sliding.STICKING, -1)
-    assert (nx, ny) == pytest.approx(normal, abs=1e-9)
-    assert (motion.fx / math.hypot(motion.fx, motion.fy), motion.fy / math.hypot(motion.fx, motion.fy)) == (
-        pytest.approx((fx, fy), abs=1e-9)
-    )
+    assert (nx, ny) == pytest.approx(turned(*normal, lies_deg), abs=1e-9)
+    size = math.hypot(motion.fx, motion.fy)
+    assert (motion.fx / size, motion.fy / size) == pytest.approx(force, abs=1e-9)
     if beyond_deg:
-        sliding = solve_at_corner(rows, 0, solve_exact, vx, vy, (-0.5, -0.1, 0.3, 2.0, needed - 0.01, None))
+        sliding = answer(needed - 0.01)
         assert sliding is None or sliding[0].mode is not Sliding.STICKING
 
 
