@@ -123,7 +123,7 @@ class DriverBase(ABC):
     def from_rig(cls, address: str, options: Mapping[str, Any]) -> Self:
         """Return `cls(address)`; a driver with options of its own overrides this. Raises ConfigError for any option."""
         no_more_options(cls.__name__, options)
-        return cls(address)  # type: ignore[call-arg]
+        return cls(address)  # type: ignore[call-arg]  # a driver whose constructor takes more overrides this
 
     @abstractmethod
     def open(self) -> DeviceInfo:
