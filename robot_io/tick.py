@@ -219,13 +219,13 @@ class EnvelopeState(msgspec.Struct, frozen=True, gc=False):
     __ros_name__: ClassVar[str] = "push_msgs/msg/EnvelopeState"
     last: BodyTwist = BodyTwist()
     clamps: int = 0
-    """How often a velocity had to be clamped, in all."""
+    """How often a velocity has been clamped."""
     clamped: bool = False
-    """Whether this tick's was."""
+    """Whether this tick's velocity was clamped."""
 
 
 class TickState(msgspec.Struct, frozen=True, gc=False):
-    """All that is remembered from tick to tick."""
+    """Everything that is kept from tick to tick."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/TickState"
     control: ControlState = ControlState()

@@ -21,8 +21,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from robot_io.log.mcap_read import LogMessage, read_log
 from robot_io.log.world_messages import COMMAND_CDR, STATE_CDR
+from robot_io.mcap.read import LogMessage, read_log
 from robot_io.messages import BodyTwist
 from tests.host_watch import HostStalled, HostWatch
 

@@ -63,7 +63,7 @@ class _Cursor:
         self.at = HEADER_BYTES
 
     def take(self, size: int, count: int = 1) -> int:
-        """Step over so many aligned elements and return where they begin."""
+        """Step over `count` aligned elements and return where they begin."""
         start = self.at + (-(self.at - HEADER_BYTES) % size)
         if size * count > len(self.payload) - start:
             raise NotThisType("it ends too soon")
@@ -71,7 +71,7 @@ class _Cursor:
         return start
 
     def count(self, element_min: int) -> int:
-        """Return the count of a sequence whose elements take so many bytes at least."""
+        """Return the length of a sequence whose elements take at least `element_min` bytes."""
         start = self.take(4)
         count = int.from_bytes(self.payload[start : start + 4], "little" if self.order == "<" else "big")
         self.require(count, element_min)

@@ -20,7 +20,7 @@ class Packed(NamedTuple):
     packs: list[Callable[..., bytes]]
 
 
-class Written(NamedTuple):
+class WriterCall(NamedTuple):
     """A field of variable length, and what appends its value."""
 
     path: str
@@ -34,14 +34,14 @@ class Slot(NamedTuple):
     enum: type | None = None
 
 
-class Made(NamedTuple):
+class Construction(NamedTuple):
     """A Struct and where its fields come from."""
 
     struct_type: Any
     children: list[Any]
 
 
-def writer_of(parts: list[Packed | Written], header_bytes: int) -> Write:
+def writer_of(parts: list[Packed | WriterCall], header_bytes: int) -> Write:
     """Return `write(message, out)`, which appends the parts one after another; offsets count from `header_bytes` on.
 
     The paths must be attribute names. It raises ValueError for an array of another length.
@@ -62,7 +62,7 @@ def writer_of(parts: list[Packed | Written], header_bytes: int) -> Write:
         return known[path]
 
     for i, part in enumerate(parts):
-        if isinstance(part, Written):
+        if isinstance(part, WriterCall):
             names[f"write{i}"] = part.write
             lines.append(f"write{i}({value(part.path)}, out)")
             continue
@@ -80,7 +80,7 @@ def writer_of(parts: list[Packed | Written], header_bytes: int) -> Write:
     return write
 
 
-def builder_of(tree: Made | Slot) -> Build:
+def builder_of(tree: Construction | Slot) -> Build:
     """Return `build(values)`, which makes the tree from the flat values of its slots, in order."""
     names: dict[str, Any] = {}
     taken = 0
@@ -90,9 +90,9 @@ def builder_of(tree: Made | Slot) -> Build:
         names[name] = thing
         return name
 
-    def expression(node: Made | Slot) -> str:
+    def expression(node: Construction | Slot) -> str:
         nonlocal taken
-        if isinstance(node, Made):
+        if isinstance(node, Construction):
             return f"{named(node.struct_type)}({', '.join(map(expression, node.children))})"
         at, taken = taken, taken + (node.length or 1)
         if node.length is None:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from robot_io.cdr.packer import Build, Packed, Write, Written, writer_of
+from robot_io.cdr.packer import Build, Packed, Write, WriterCall, writer_of
 from robot_io.cdr.shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text, builder, leaves
 
 HEADER_BYTES = 4
@@ -76,7 +76,7 @@ class _Part(ABC):
     min_bytes: int
 
     @abstractmethod
-    def writing(self) -> Packed | Written:
+    def writing(self) -> Packed | WriterCall:
         """Return how it is written."""
 
     @abstractmethod
@@ -120,8 +120,8 @@ class _Text(_Part):
     def __init__(self, path: str) -> None:
         self._path = path
 
-    def writing(self) -> Written:
-        return Written(self._path, _write_text)
+    def writing(self) -> WriterCall:
+        return WriterCall(self._path, _write_text)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         text, at = _read_text(payload, at)
@@ -137,8 +137,8 @@ class _Blob(_Part):
     def __init__(self, path: str) -> None:
         self._path = path
 
-    def writing(self) -> Written:
-        return Written(self._path, _write_blob)
+    def writing(self) -> WriterCall:
+        return WriterCall(self._path, _write_blob)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         count, at = _read_count(payload, at, 1)
@@ -156,8 +156,8 @@ class _Numbers(_Part):
         self._code, self._size = PRIMITIVES[scalar.ros]
         self._enum = scalar.enum
 
-    def writing(self) -> Written:
-        return Written(self._path, self._write)
+    def writing(self) -> WriterCall:
+        return WriterCall(self._path, self._write)
 
     def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
         _write_count(len(values), out)
@@ -199,8 +199,8 @@ class _Items(_Part):
             self._element_min = _Text.min_bytes
         self.min_bytes = 4 if count is None else count * self._element_min
 
-    def writing(self) -> Written:
-        return Written(self._path, self._write)
+    def writing(self) -> WriterCall:
+        return WriterCall(self._path, self._write)
 
     def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
         if self._count is None:

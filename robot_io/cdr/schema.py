@@ -42,7 +42,7 @@ def shape_from_schema(name: str, text: str) -> Nested:
     except (ValueError, TypeError) as error:
         raise _unusable(name, error) from None
     if not isinstance(shape, Nested):
-        raise _unusable(name, "it is no message")
+        raise _unusable(name, "it is not a message")
     return shape
 
 

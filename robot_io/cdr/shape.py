@@ -20,7 +20,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
 
-from robot_io.cdr.packer import Made, Slot, builder_of
+from robot_io.cdr.packer import Construction, Slot, builder_of
 
 # ROS 2 primitive -> (code of the struct module, bytes); sizes and alignment are the same number in CDR.
 PRIMITIVES: dict[str, tuple[str, int]] = {
@@ -140,24 +140,24 @@ def leaves(shape: Nested, prefix: str = "") -> Iterator[tuple[str, Shape]]:
 
 def builder(shape: Nested) -> Callable[[list[Any]], Any]:
     """Return the function that makes the Struct from its values, in wire order: fixed arrays of numbers are flat."""
-    return builder_of(_made(shape))
+    return builder_of(_construction(shape))
 
 
-def _made(shape: Nested) -> Made:
+def _construction(shape: Nested) -> Construction:
     if tuple(name for name, _ in shape.fields) != _positional(shape.struct_type):
         raise TypeError(f"{shape.ros_name}: fields must be positional, in order")
-    children: list[Made | Slot] = []
+    children: list[Construction | Slot] = []
     for _, field in shape.fields:
         match field:
             case Nested():
-                children.append(_made(field))
+                children.append(_construction(field))
             case Scalar(_, enum):
                 children.append(Slot(None, enum))
             case Many(Scalar(_, enum), int() as length):
                 children.append(Slot(length, enum))
             case _:
                 children.append(Slot())
-    return Made(shape.struct_type, children)
+    return Construction(shape.struct_type, children)
 
 
 def _positional(struct_type: Any) -> tuple[str, ...]:

@@ -2,8 +2,8 @@
 
 A stream packet is 16 bytes: `20 4E`, six little-endian int16 (Fx Fy Fz Mx My Mz), CRC low byte, CRC high byte
 (Robotiq FT 300 manual, "data stream"). Forces count 0.01 N, torques 0.001 N*m. Registers are big-endian words
-read by Modbus RTU. The header is no reserved value: it also is the force 200.00 N, and may arise across two
-fields, so only the CRC decides.
+read by Modbus RTU. The header is not reserved: it is also the force 200.00 N and may arise across two fields,
+so only the CRC decides.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Driver of the Robotiq FT 300 force-torque sensor (also FT 150 and FT 300-S, which speak the same protocol).
 
-The sensor speaks Modbus RTU until it is told to stream; then it sends 100 packets a second and answers nothing
+The sensor uses Modbus RTU until it is told to stream; then it sends 100 packets a second and answers nothing
 until it hears 0xFF for long enough. Values are raw: bias and tool weight are in them. A sample is stamped when
 its last byte was read, 8.3 ms of line time (and up to the USB adapter's latency timer) after it was measured.
 A lost line is reported by `health`; only a fresh `open` brings it back, and the bias may have changed by then.

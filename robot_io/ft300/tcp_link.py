@@ -1,4 +1,4 @@
-"""A serial server over TCP as pyserial sees it, with its unbounded habits mended."""
+"""A serial server over TCP as pyserial sees it, with bounds where pyserial has none."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class TcpPort(protocol_socket.Serial):
         super().open()
 
     def reset_input_buffer(self) -> None:
-        """Throw away what has come, at most 64 kB (pyserial goes on while the peer does). Raises OSError."""
+        """Discard what has arrived, at most 64 kB (pyserial reads as long as the peer sends). Raises OSError."""
         for _ in range(MOST_READS):
             if not select.select([self._socket], [], [], 0)[0] or not self._socket.recv(4096):
                 return

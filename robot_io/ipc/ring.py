@@ -80,7 +80,7 @@ class Ring:
     def pop_all(self, limit: int = 1_000_000) -> list[Record]:
         """Take at most `limit` records, oldest first. Consumer only; never blocks.
 
-        Raises LogDamaged when the next bytes are no record (a program error: a producer that dies leaves none);
+        Raises LogDamaged when the next bytes are not a record (a program error: a producer that dies leaves none);
         everything in the ring is then skipped, so that the next call starts clean.
         """
         head, tail = self._counters[_HEAD], self._counters[_TAIL]

@@ -1,4 +1,4 @@
-"""How a child process speaks to the one that started it: JSON lines on a pipe, never blocking the speaker.
+"""How a child process reports to the one that started it: JSON lines on a pipe, never blocking the sender.
 
 {"event": "ready", ...}        it does its work; what else is in it is for whoever started it
 {"event": "error", "kind": "DeviceUnreachable", "error": {"code": 4, "what": "...", "where": "...", "do": "..."}}

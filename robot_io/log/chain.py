@@ -27,7 +27,7 @@ class TickChain:
         return linked
 
     def holds(self, payload: bytes) -> bool:
-        """Return whether a payload that was read is the next link; the chain goes on with it either way."""
+        """Return whether a payload that was read is the next link; the chain continues with it either way."""
         good = len(payload) >= _FIELD.stop and payload[_FIELD] == _CRC.pack(self.crc32)
         self._note(payload)
         return good

@@ -64,7 +64,7 @@ CHANGED_TOPICS = (ChangedTopic("/diagnostics", 1), ChangedTopic("/safety/event",
 def format_of(run_metadata: Mapping[str, str], where: str = "") -> int:
     """Return the format of the log `where` from its metadata `run`.
 
-    Raises LogDamaged when that is no number from 1 up, UsageError for a later format than today's.
+    Raises LogDamaged unless that is a number of at least 1, UsageError for a format newer than this program's.
     """
     said = run_metadata.get(FORMAT_FACT, str(_FIRST_FORMAT))
     if not (said.isascii() and said.isdigit() and 0 < len(said) < 10 and int(said) >= _FIRST_FORMAT):

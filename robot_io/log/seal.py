@@ -1,7 +1,7 @@
-"""Seals a log: figures of all it holds, written at its end, so that nothing in it is changed, lost or doubled unseen.
+"""Seals a log: figures of all it holds, written at its end, so that a change, loss or duplicate is found.
 
 The chain of `chain` says which tick was altered; the seal covers every other topic, the settings, and how the log
-ends. It does not depend on the order of messages, so that a tool that sorts a log by time leaves it whole.
+ends. It does not depend on the order of messages, so that a log sorted by time stays valid.
 """
 
 from __future__ import annotations

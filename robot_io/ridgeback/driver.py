@@ -3,14 +3,13 @@
 One thread, never blocking after `start`: call `drain` when `fileno()` is readable and at least every 20 ms.
 What the bridge gets wrong is handled here: it never reports an error (checked beforehand by
 `preflight`, and by hearing our own commands back), it delivers old commands after a hang (nothing
-that moves is sent on a quiet link; a link that is quiet, or gives back none of our commands, for 0.3 s is reset,
+that moves is sent on a quiet link; a link that is quiet, or echoes none of our commands, for 0.3 s is reset,
 never closed in peace, never reopened), and it forwards NaN, which the base takes for full speed backwards (refused).
 The base itself stops 0.25 s after the last command.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, Self
 
@@ -19,7 +18,6 @@ from robot_io.driver import DriverBase, no_more_options
 from robot_io.errors import ConfigError, DeviceNotReady, DeviceUnreachable
 from robot_io.messages import (
     BaseFeed,
-    BasePose,
     BodyTwist,
     CommandEcho,
     DeviceHealth,
@@ -29,6 +27,7 @@ from robot_io.messages import (
     Stamped,
 )
 from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
+from robot_io.ridgeback.pending import PendingSamples
 from robot_io.ridgeback.preflight import check_topics
 from robot_io.ridgeback.rosbridge_codec import (
     Published,
@@ -49,8 +48,6 @@ LINK_STALE_NS = 300 * NS_PER_MS
 """The link is reset when the newest message from the bridge is older than this, or a command not heard back since."""
 PING_PERIOD_NS = 100 * NS_PER_MS
 FIRST_MESSAGE_TIMEOUT_S = 2.0
-MAX_PENDING = 4096
-"""Samples kept for `drain`; older ones are dropped and counted."""
 
 ZERO = BodyTwist()
 
@@ -58,7 +55,7 @@ ZERO = BodyTwist()
 class Ridgeback(DriverBase):
     """A Ridgeback behind rosbridge: takes velocities (m/s, rad/s, BODY frame), gives pose, odometry and status.
 
-    url: `ws://host:port` of the bridge; `wss` is not spoken.
+    url: `ws://host:port` of the bridge; `wss` is not supported.
     topics: names and types of the base's ROS topics.
     pose_source: which topic says where the base is: `"mocap"`, `"odometry"` or `"joint_states"`.
     base_from_marker: x (m), y (m), yaw (rad) of the motion capture's marker frame in the BODY frame.
@@ -66,8 +63,8 @@ class Ridgeback(DriverBase):
     before_close: called with the descriptor just before the socket is closed, also when the link is given up: an event
         loop must forget it then.
 
-    Raises ConfigError: an address that is none, or topics that cannot serve the pose source. For one thread at a time,
-    and it starts none.
+    Raises ConfigError: an address that is not a websocket url, or topics that cannot serve the pose source. For one
+    thread at a time, and it starts none.
     """
 
     def __init__(
@@ -94,8 +91,7 @@ class Ridgeback(DriverBase):
         self._link: WebSocketLink | None = None
         self._state = LinkState.CLOSED
         self._cause = ""
-        self._samples: deque[Stamped[BaseFeed]] = deque()
-        self._pose_times: deque[int] = deque(maxlen=100)
+        self._pending = PendingSamples()
         self._last_ping_ns = 0
         self._unheard_ns = 0  # when the oldest command left that may not have been heard back; 0 when there is none
         self._started = False
@@ -106,7 +102,7 @@ class Ridgeback(DriverBase):
         self.sent_ns = 0
         """When the last command left."""
         self._counters = dict.fromkeys(
-            ("messages", "undecodable", "sent", "held_back", "dropped_samples", "unanswered_checks", "pings"), 0
+            ("messages", "undecodable", "sent", "held_back", "unanswered_checks", "pings"), 0
         )
 
     @classmethod
@@ -174,19 +170,17 @@ class Ridgeback(DriverBase):
 
         At most 4096; older ones are dropped and counted. Never blocks, never raises; call it at least every 20 ms.
         """
-        now_ns = self._clock()  # before looking: what a pause of this process kept waiting is no silence
+        now_ns = self._clock()  # before looking: what waited while this process was paused is not silence
         self._receive()
         self._tend(now_ns)
-        samples = tuple(self._samples)
-        self._samples.clear()
-        return samples
+        return self._pending.take_all()
 
     def command(self, wanted: BodyTwist) -> BodyTwist:
         """Send a velocity (m/s, m/s, rad/s, BODY frame); return what was really sent.
 
         Zero is sent instead when the link has been quiet for 0.1 s, and zero is returned when nothing could be sent
         (`health` says why): the base then stops by its own timeout. That is 0.25 s after the last command, so a motion
-        goes on only as long as commands do. Never blocks. Raises ValueError unless finite.
+        lasts only as long as commands do. Never blocks. Raises ValueError unless finite.
         """
         payload = encode_twist(self._topic, self._type, wanted)
         now_ns = self._clock()
@@ -207,13 +201,11 @@ class Ridgeback(DriverBase):
         Counters since `open`: `messages`, `undecodable`, `sent`, `held_back` (motion turned into zero on a quiet link),
         `dropped_samples`, `unanswered_checks`, `pings`, and one for each kind of sample.
         """
-        times = self._pose_times
-        span_ns = times[-1] - times[0] if len(times) > 1 else 0
-        rate_hz = (len(times) - 1) * NS_PER_S / span_ns if span_ns else 0.0
-        return DeviceHealth(self._state, self._cause, {**self._counters, **self._reader.counters}, rate_hz)
+        counters = {**self._counters, "dropped_samples": self._pending.dropped, **self._reader.counters}
+        return DeviceHealth(self._state, self._cause, counters, self._pending.pose_rate_hz())
 
     def stop(self) -> None:
-        """Send zero three times, if the link still stands. Never blocks, never raises."""
+        """Send zero three times, if the link is up. Never blocks, never raises."""
         for _ in range(3):
             if self._link is not None:
                 self._send(encode_twist(self._topic, self._type, ZERO))
@@ -229,8 +221,7 @@ class Ridgeback(DriverBase):
 
     def _reset(self) -> None:
         self._cause = ""
-        self._samples.clear()
-        self._pose_times.clear()
+        self._pending.clear()
         self._reader.reset()
         self.newest_inbound_ns = self.newest_pong_ns = self.sent_ns = self._last_ping_ns = 0
         self._unheard_ns = 0
@@ -257,21 +248,16 @@ class Ridgeback(DriverBase):
                 self._counters["undecodable"] += 1
                 continue
             for sample in samples:
-                if isinstance(sample.value, BasePose):
-                    self._pose_times.append(received_ns)
-                elif isinstance(sample.value, CommandEcho):
+                if isinstance(sample.value, CommandEcho):
                     self._unheard_ns = 0
-                if len(self._samples) == MAX_PENDING:
-                    self._samples.popleft()
-                    self._counters["dropped_samples"] += 1
-                self._samples.append(sample)
+                self._pending.add(sample)
 
     def _tend(self, now_ns: int) -> None:
         if self._link is None or not self._started:
             return
         if now_ns - self.newest_inbound_ns > LINK_STALE_NS:
             self._give_up(f"no message from the bridge for {LINK_STALE_NS / NS_PER_S:g} s")
-        elif self._unheard_ns and now_ns - self._unheard_ns > LINK_STALE_NS:  # they wait somewhere, or are thrown away
+        elif self._unheard_ns and now_ns - self._unheard_ns > LINK_STALE_NS:  # they are queued somewhere, or discarded
             self._give_up(f"the bridge echoed none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
         elif now_ns - self._last_ping_ns >= PING_PERIOD_NS:
             self._last_ping_ns = now_ns

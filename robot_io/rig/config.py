@@ -223,7 +223,7 @@ def load_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConf
 
 
 def rig_to_toml(rig: RigConfig) -> str:
-    """Write the whole resolved rig as TOML; `rig_from_toml` gives back an equal rig, every float bit for bit."""
+    """Write the whole resolved rig as TOML; `rig_from_toml` returns an equal rig, every float bit for bit."""
     return toml_text.emit(msgspec.to_builtins(rig))
 
 

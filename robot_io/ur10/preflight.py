@@ -1,6 +1,6 @@
 """Look at a UR10 with plain sockets before the ur_rtde wheel touches it.
 
-The wheel blocks for ever on a controller that accepts and stays silent, and aborts on one that speaks
+The wheel blocks for ever on a controller that accepts and stays silent, and aborts on one that sends
 something else. Every step here has a deadline of 1 s, all together under 3.5 s, and nothing is sent that could
 move the arm: two RTDE questions and five dashboard questions.
 Sources: RTDE guide (framing, protocol 2), dashboard server manual CB3.

@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 from robot_io.log.channels import Kind
-from robot_io.log.mcap_read import LogSummary, read_summary
-from robot_io.log.mcap_recover import recover
+from robot_io.log.recovery import recover
+from robot_io.mcap.read import LogSummary, read_summary
 from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, Pose2D, WorldTwist
 from robot_io.rig.config import load_rig, rig_to_toml
 from robot_io.tick import (

@@ -15,8 +15,8 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from msgspec.structs import replace
 
-from robot_io.log.mcap_read import read_summary
 from robot_io.log.seal import LogSeal
+from robot_io.mcap.read import read_summary
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.cli import main
 

@@ -11,8 +11,8 @@ import pytest
 from msgspec.structs import replace
 
 from robot_io.errors import LogDamaged
-from robot_io.log.mcap_read import read_summary
 from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
+from robot_io.mcap.read import read_summary
 from robot_io.messages import BodyTwist, LinkState, Pose2D, WorldTwist
 from robot_io.tick import ControlTick, Operator
 from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten, with_data, with_input

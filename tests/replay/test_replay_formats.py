@@ -10,8 +10,8 @@ from msgspec.structs import replace
 
 from robot_io.log import log_format
 from robot_io.log.log_format import ChangedTopic, EarlierValue, RenamedField
-from robot_io.log.mcap_read import read_log, read_summary
 from robot_io.log.world_messages import STATE_CDR
+from robot_io.mcap.read import read_log, read_summary
 from robot_io.tick import ControlTick
 from tests.replay.older import EditText, as_older, instead, older_type, without, write_older
 from tests.replay.runs import Edit, Messages, changed, replayed, resealed, rewritten

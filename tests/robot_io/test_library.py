@@ -138,7 +138,7 @@ def test_importing_it_costs_no_device_and_nothing_heavy():
     assert not loaded & (HEAVY | {"serial", "websockets", "robot_io.ft300.driver", "robot_io.ur10.driver"})
 
 
-@pytest.mark.parametrize("name", ["Ft300", "Ur10", "Ridgeback", "open_device", "rig.load_rig", "log.read_log"])
+@pytest.mark.parametrize("name", ["Ft300", "Ur10", "Ridgeback", "open_device", "rig.load_rig", "mcap.read_log"])
 def test_no_part_of_it_needs_what_the_application_needs(name):
     room, _, what = name.rpartition(".")
     loaded = loaded_by(f"from robot_io{'.' if room else ''}{room} import {what}")

@@ -19,7 +19,7 @@ from typing import Any
 from robot_io.clock import NS_PER_S
 from robot_io.error_report import say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
-from robot_io.log.mcap_read import read_summary
+from robot_io.mcap.read import read_summary
 from robot_io.rig.config import rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.kinds import device_names

@@ -17,8 +17,8 @@ import msgspec
 from robot_io.clock import NS_PER_S
 from robot_io.error_report import SCHEMA, printable, say_json, tell
 from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
-from robot_io.log.mcap_read import LogSummary, read_summary
-from robot_io.log.mcap_recover import recover
+from robot_io.log.recovery import recover
+from robot_io.mcap.read import LogSummary, read_summary
 from tools.log.decode import Decoders, columns
 from tools.places.at_rest import at_rest, comes_once
 from tools.places.find_log import find_log

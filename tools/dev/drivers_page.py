@@ -96,9 +96,10 @@ PARTS = (
     Part(
         "Logs",
         "robot_io.log",
-        ("read_log", "read_summary", "LogMessage", "LogSummary", "recover", "McapLog", "CHANNELS", "Kind"),
+        ("CHANNELS", "Kind", "recover"),
         more="What is in a log: [logs](logs.md).",
     ),
+    Part("MCAP files", "robot_io.mcap", ("read_log", "read_summary", "LogMessage", "LogSummary", "McapLog")),
     Part("ROS 2 messages as bytes", "robot_io.cdr", ("CdrType", "type_from_schema"), "robot_io.cdr.cdr_type"),
     Part("Time", "robot_io.clock", ("monotonic_ns", "VirtualClock"), "robot_io.clock"),
     Part("Errors", "robot_io.errors", ("PushError",), "robot_io.errors"),

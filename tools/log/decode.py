@@ -13,9 +13,9 @@ from robot_io.cdr.of_others import ReaderOfOthers
 from robot_io.cdr.schema import shape_from_schema, type_from_schema
 from robot_io.cdr.shape import Blob, Many, Nested, Shape
 from robot_io.errors import LogDamaged, UsageError
-from robot_io.log.mcap_log import LIBRARY, MESSAGE_ENCODING, SCHEMA_ENCODING
-from robot_io.log.mcap_read import LogSummary
-from robot_io.log.mcap_walk import Topic, walk
+from robot_io.mcap.log_file import LIBRARY, MESSAGE_ENCODING, SCHEMA_ENCODING
+from robot_io.mcap.read import LogSummary
+from robot_io.mcap.walk import Topic, walk
 
 # Unit of a field by the type that holds it; an empty field name stands for every field of the type.
 _UNITS: dict[str, dict[str, str]] = {

@@ -11,9 +11,9 @@ from pathlib import Path
 from robot_io.errors import LogDamaged
 from robot_io.log.chain import TickChain
 from robot_io.log.channels import BY_TOPIC, CHANNELS, Kind
-from robot_io.log.mcap_log import McapLog
 from robot_io.log.seal import LogSeal, config_seal
 from robot_io.log.world_messages import STATE_CDR
+from robot_io.mcap.log_file import McapLog
 from robot_io.rig.config import rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.log.derivation import TICK_TOPIC, Derivation

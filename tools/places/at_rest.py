@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robot_io.errors import EnvironmentFault, PushError, UsageError
-from robot_io.log.mcap_walk import MAGIC
+from robot_io.mcap.walk import MAGIC
 
 _BLOCK_BYTES = 1 << 20
 

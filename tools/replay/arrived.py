@@ -12,7 +12,7 @@ import msgspec
 
 from robot_io.log.channels import CHANNELS
 from robot_io.log.gate_log import GateLog
-from robot_io.log.mcap_read import ChannelInfo
+from robot_io.mcap.read import ChannelInfo
 from robot_io.messages import BaseFeed, BaseOdometry, BasePose, BaseReport, Stamped
 from robot_io.tick import ControlTick
 from tools.replay.difference import Difference

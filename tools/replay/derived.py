@@ -14,9 +14,9 @@ import msgspec
 from robot_io.errors import LogDamaged
 from robot_io.log import log_format
 from robot_io.log.channels import DERIVED
-from robot_io.log.mcap_read import ChannelInfo
 from robot_io.log.messages import GATE_SAYS, SAFETY_EVENT
 from robot_io.log.world_messages import WorldState
+from robot_io.mcap.read import ChannelInfo
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick
 from tools.log.derivation import SLIDER_TOPIC, TICK_TOPIC, WORLD_TOPIC, Derivation

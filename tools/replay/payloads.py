@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robot_io.errors import LogDamaged
 from robot_io.log.channels import BY_TOPIC
-from robot_io.log.mcap_read import ChannelInfo
+from robot_io.mcap.read import ChannelInfo
 from tools.replay.difference import Difference, difference
 
 

@@ -13,10 +13,10 @@ from robot_io.errors import LogDamaged, PushError, ReplayDiffers
 from robot_io.log.chain import TickChain
 from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
-from robot_io.log.mcap_log import CONFIG_ATTACHMENT, END_METADATA, LIBRARY, RUN_METADATA
-from robot_io.log.mcap_read import LogMessage, LogSummary, read_log, read_summary
-from robot_io.log.mcap_recover import RECOVERED_METADATA
+from robot_io.log.recovery import RECOVERED_METADATA
 from robot_io.log.seal import CONFIG_FACT, LogSeal, PayloadSeal, config_seal, seal_of
+from robot_io.mcap.log_file import CONFIG_ATTACHMENT, END_METADATA, LIBRARY, RUN_METADATA
+from robot_io.mcap.read import LogMessage, LogSummary, read_log, read_summary
 from robot_io.rig.config import RigConfig
 from robot_io.rig.logged import rig_of_log
 from robot_io.tick import TICK_CDR, ControlTick

@@ -19,7 +19,7 @@ from string import Template
 from typing import Any
 
 from robot_io.errors import EnvironmentFault, PushError, UsageError
-from robot_io.log.mcap_walk import Grown
+from robot_io.mcap.walk import Grown
 from safety.faults import FAULTS
 from tools.places.whole_file import write_whole
 from tools.report import words

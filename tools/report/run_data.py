@@ -15,11 +15,11 @@ from robot_io.errors import LogDamaged, PushError
 from robot_io.geometry import StraightPath, wrap_angle, yaw_from_quaternion
 from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
-from robot_io.log.mcap_log import RUN_METADATA
-from robot_io.log.mcap_walk import Grown, Topic, walk
 from robot_io.log.messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
 from robot_io.log.ros_messages import POSE_STAMPED
 from robot_io.log.world_messages import STATE_CDR
+from robot_io.mcap.log_file import RUN_METADATA
+from robot_io.mcap.walk import Grown, Topic, walk
 from robot_io.rig.config import RigConfig
 from robot_io.rig.logged import rig_of_log
 from robot_io.tick import TICK_CDR, ControlTick, Phase

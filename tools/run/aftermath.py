@@ -7,8 +7,8 @@ from typing import Any
 
 from control.run_notes import RunNotes, outcome
 from robot_io.errors import LogDamaged
-from robot_io.log.mcap_read import read_log
 from robot_io.log.messages import GATE_SAYS, SAFETY_EVENT, SafetyEvent
+from robot_io.mcap.read import read_log
 from robot_io.tick import TICK_CDR, ControlTick, Mode
 
 

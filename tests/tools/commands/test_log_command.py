@@ -14,7 +14,7 @@ from mcap.writer import Writer
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.log import ros_messages as ros
-from robot_io.log.mcap_log import McapLog
+from robot_io.mcap.log_file import McapLog
 from robot_io.messages import Pose2D
 from tools.cli import main
 

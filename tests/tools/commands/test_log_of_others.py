@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.robot_io.log import mcap_by_hand as by_hand
+from tests.robot_io.mcap import mcap_by_hand as by_hand
 from tools.cli import main
 
 HELLO = by_hand.HELLO

@@ -20,8 +20,8 @@ from msgspec.structs import replace
 
 from robot_io.errors import LogDamaged
 from robot_io.log.channels import Kind
-from robot_io.log.mcap_read import read_log, read_summary
-from robot_io.log.mcap_recover import recover
+from robot_io.log.recovery import recover
+from robot_io.mcap.read import read_log, read_summary
 from robot_io.rig.config import RigConfig, load_rig, rig_from_toml, rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick, Phase
 from tools.cli import main
@@ -280,7 +280,7 @@ def test_settings_are_compared_with_the_shipped_rig_of_that_name():
 
 def test_the_log_of_another_program_is_refused(ran, tmp_path):
     from robot_io.cdr.cdr_type import CdrType
-    from robot_io.log.mcap_log import McapLog
+    from robot_io.mcap.log_file import McapLog
     from robot_io.messages import Pose2D
 
     for topic, what in (

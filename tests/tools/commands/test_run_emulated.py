@@ -17,7 +17,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from robot_io.log.mcap_read import read_summary
+from robot_io.mcap.read import read_summary
 from robot_io.tick import TICK_CDR, Phase
 from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import PUSH, QUICK, ROOT, Run, finished, messages, one_error, stands, started, world_of

@@ -9,11 +9,14 @@ import re
 import pytest
 
 from robot_io import Ft300, Ridgeback, Ur10
-from robot_io.log import McapLog
+from robot_io.mcap import McapLog
 from tools.dev.api_markdown import prose
 from tools.dev.drivers_page import page
 
-ROOMS = ("robot_io.ft300", "robot_io.ur10", "robot_io.ridgeback", "robot_io.rig", "robot_io.log", "robot_io.cdr")
+ROOMS = (
+    *("robot_io.ft300", "robot_io.ur10", "robot_io.ridgeback", "robot_io.rig"),
+    *("robot_io.log", "robot_io.mcap", "robot_io.cdr"),
+)
 MODULES = ("robot_io.driver", "robot_io.messages")
 
 

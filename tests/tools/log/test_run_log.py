@@ -9,9 +9,9 @@ import pytest
 
 from robot_io.log.chain import TickChain
 from robot_io.log.channels import Kind
-from robot_io.log.mcap_read import read_log
 from robot_io.log.ros_messages import POSE_STAMPED, TF_MESSAGE, Header, PoseStamped, planar_pose, ros_time
 from robot_io.log.world_messages import STATE_CDR, WorldState
+from robot_io.mcap.read import read_log
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.rig.config import load_rig, rig_to_toml
 from tools.log.run_log import RunLog

@@ -17,9 +17,9 @@ from msgspec.structs import replace
 
 from robot_io.clock import NS_PER_S, SIM_EPOCH_NS
 from robot_io.log.channels import CHANNELS, Kind
-from robot_io.log.mcap_read import read_log, read_summary
 from robot_io.log.messages import GATE_DECISION
 from robot_io.log.world_messages import STATE_CDR
+from robot_io.mcap.read import read_log, read_summary
 from robot_io.messages import BaseOdometry, BodyTwist
 from robot_io.rig.config import rig_to_toml
 from robot_io.tick import TICK_CDR

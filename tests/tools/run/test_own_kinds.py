@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_io.log.mcap_read import read_log
+from robot_io.mcap.read import read_log
 from robot_io.tick import TICK_CDR
 from tests.push_runs import QUICK, started
 

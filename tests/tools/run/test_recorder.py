@@ -21,10 +21,10 @@ from robot_io.errors import LogDamaged
 from robot_io.ipc.ring import Ring
 from robot_io.log.chain import TickChain
 from robot_io.log.channels import CHANNELS, Kind
-from robot_io.log.mcap_read import read_log, read_summary
-from robot_io.log.mcap_recover import recover
-from robot_io.log.mcap_walk import walk
+from robot_io.log.recovery import recover
 from robot_io.log.ros_messages import LOG, Log, ros_time
+from robot_io.mcap.read import read_log, read_summary
+from robot_io.mcap.walk import walk
 from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, Pose2D, WorldTwist
 from robot_io.rig.config import load_rig, rig_to_toml
 from robot_io.tick import (

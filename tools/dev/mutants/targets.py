@@ -25,7 +25,7 @@ WHOLE = (
     "robot_io/ipc/gate_frame.py",
     "robot_io/log/chain.py",
     "robot_io/log/format_1.py",
-    "robot_io/log/mcap_walk.py",
+    "robot_io/mcap/walk.py",
     "robot_io/log/ros_messages.py",
     "robot_io/log/seal.py",
     "robot_io/ridgeback/rosbridge_codec.py",

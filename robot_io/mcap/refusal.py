@@ -13,7 +13,7 @@ RECORD_LIMIT = 64 << 20
 def truncated(path: Path) -> LogDamaged:
     """Return the error for a file that ends too soon."""
     return LogDamaged(
-        "the log is truncated (its recorder was killed, the disk was full, or the run still goes on)",
+        "the log is truncated (its recorder was killed, the disk was full, or the run is still going on)",
         where=str(path),
         do=f"When the run is over, `push log recover {path}` repairs what is there",
     )
@@ -34,5 +34,5 @@ def beyond(path: Path, why: str) -> LogDamaged:
 
 
 def too_large(path: Path, what: str, size_bytes: int) -> LogDamaged:
-    """Return the error for a part of a file by others that is larger than what is taken into memory."""
-    return beyond(path, f"{what} has {size_bytes} bytes, and at most {RECORD_LIMIT} are taken into memory")
+    """Return the error for a part of a file of others that is larger than what is read into memory."""
+    return beyond(path, f"{what} has {size_bytes} bytes, and at most {RECORD_LIMIT} are read into memory")

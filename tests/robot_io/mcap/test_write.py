@@ -9,7 +9,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from robot_io.log.mcap_write import McapWriter
+from robot_io.mcap.write import McapWriter
 
 
 def call_all(writer: Writer | McapWriter, seed: int, messages: int) -> None:

@@ -19,10 +19,10 @@ from rosbags.interfaces import QosDurability
 
 from robot_io.errors import LogDamaged, UsageError
 from robot_io.log import ros_messages as ros
-from robot_io.log.mcap_log import McapLog
-from robot_io.log.mcap_read import read_log, read_summary
-from robot_io.log.mcap_recover import recover
-from robot_io.log.mcap_walk import walk
+from robot_io.log.recovery import recover
+from robot_io.mcap.log_file import McapLog
+from robot_io.mcap.read import read_log, read_summary
+from robot_io.mcap.walk import walk
 
 CONFIG = 'kind = "sim"\n'
 START_NS = 1_600_000_000_000_000_000
@@ -297,7 +297,7 @@ WRITER = """
 import sys, time
 from pathlib import Path
 from robot_io.log import ros_messages as ros
-from robot_io.log.mcap_log import McapLog
+from robot_io.mcap.log_file import McapLog
 log = McapLog(Path(sys.argv[1]), config_text="", metadata={})
 log.channel("/chatter", ros.STRING)
 for n in range(10**6):
@@ -333,7 +333,7 @@ def test_a_full_disk_while_recovering_is_a_sentence_and_leaves_nothing(tmp_path)
     code = (
         "import resource, sys, pathlib\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000))\n"
-        "from robot_io.log.mcap_recover import recover\n"
+        "from robot_io.log.recovery import recover\n"
         "from robot_io.errors import EnvironmentFault\n"
         "try: recover(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]))\n"
         "except EnvironmentFault as fault: print(fault)\n"

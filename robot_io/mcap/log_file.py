@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.errors import EnvironmentFault, UsageError
-from robot_io.log.mcap_write import McapWriter
+from robot_io.mcap.write import McapWriter
 
 PROFILE = "ros2"
 LIBRARY = "single-point-push"

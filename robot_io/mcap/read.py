@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from mcap.records import Attachment, Message, Metadata
 
-from robot_io.log.mcap_walk import Topic, walk
+from robot_io.mcap.walk import Topic, walk
 
 _LATCHED = re.compile(r"\bdurability: *(1|transient_local)\b")
 """In the quality of service of a channel, as rmw numbers or names it."""
@@ -55,7 +55,8 @@ class LogSummary(NamedTuple):
 def read_log(path: Path) -> Iterator[LogMessage]:
     """Yield every message of a finished log, in the order of the file.
 
-    Raises UsageError when there is no such file, LogDamaged at the latest at the end: take all before trusting any.
+    Raises UsageError when there is no such file, LogDamaged at the latest at the end: read all of it before you
+    trust any of it.
     """
     names: dict[int, tuple[str, str]] = {}
     for item in walk(path):

@@ -17,11 +17,11 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
 from robot_io.errors import LogDamaged, UsageError
-from robot_io.log.mcap_log import McapLog
-from robot_io.log.mcap_read import LogMessage, read_log, read_summary
-from robot_io.log.mcap_recover import recover
+from robot_io.log.recovery import recover
 from robot_io.log.ros_messages import STRING, String
-from tests.robot_io.log import mcap_by_hand as by_hand
+from robot_io.mcap.log_file import McapLog
+from robot_io.mcap.read import LogMessage, read_log, read_summary
+from tests.robot_io.mcap import mcap_by_hand as by_hand
 
 HELLO = by_hand.HELLO
 OPENING = by_hand.header() + by_hand.schema() + by_hand.channel()
@@ -221,7 +221,7 @@ def test_a_chunk_that_would_grow_without_bound_is_refused(saved, compression, sa
     del zeros
     chunk = bytearray(by_hand.chunk(b"", compression, bomb))
     chunk[25:33] = said.to_bytes(8, "little")
-    with pytest.raises(LogDamaged, match="another size" if said == 1000 else "at most 67108864 are taken into memory"):
+    with pytest.raises(LogDamaged, match="another size" if said == 1000 else "at most 67108864 are read into memory"):
         list(read_log(saved(by_hand.file(OPENING, bytes(chunk)))))
 
 

@@ -16,7 +16,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.records import Attachment, Chunk
 
-from robot_io.log.mcap_refusal import RECORD_LIMIT, altered, beyond, too_large
+from robot_io.mcap.refusal import RECORD_LIMIT, altered, beyond, too_large
 
 
 class ExactStream(ReadDataStream):

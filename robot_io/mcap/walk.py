@@ -27,9 +27,9 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 
 from robot_io.errors import LogDamaged, UsageError
-from robot_io.log.mcap_log import LIBRARY, MESSAGE_ENCODING, PROFILE, SCHEMA_ENCODING
-from robot_io.log.mcap_parts import ExactStream, attachment_of, checksum_holds, chunk_content
-from robot_io.log.mcap_refusal import RECORD_LIMIT, altered, beyond, too_large, truncated
+from robot_io.mcap.log_file import LIBRARY, MESSAGE_ENCODING, PROFILE, SCHEMA_ENCODING
+from robot_io.mcap.parts import ExactStream, attachment_of, checksum_holds, chunk_content
+from robot_io.mcap.refusal import RECORD_LIMIT, altered, beyond, too_large, truncated
 
 MAGIC = b"\x89MCAP0\r\n"
 NO_SCHEMA = Schema(id=0, data=b"", encoding="", name="")
@@ -225,7 +225,7 @@ class _Walk:
             raise altered(self._path, f"channel {channel.id} is declared twice")
 
     def _summary(self) -> Iterator[LogItem]:
-        """Check all behind the data; yield the topics by others of which there is no message: they stand only here."""
+        """Check everything after the data; yield the topics of others without messages: only this part names them."""
         start = self._file.tell()
         size = self._grown(sys.maxsize)
         self._grown = lambda _: size

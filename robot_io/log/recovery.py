@@ -1,4 +1,4 @@
-"""Makes a whole log of what is left of a truncated one, sealed as it is, so that a later change is seen."""
+"""Repairs a truncated log: keeps what is readable and seals it, so that a later change is found."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import NamedTuple
 from mcap.records import Attachment, Header, Message, Metadata
 
 from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
-from robot_io.log.mcap_log import CONFIG_ATTACHMENT, create_new, finish_writer
-from robot_io.log.mcap_walk import NO_SCHEMA, LogItem, Topic, walk
-from robot_io.log.mcap_write import McapWriter
 from robot_io.log.seal import LogSeal, config_seal
+from robot_io.mcap.log_file import CONFIG_ATTACHMENT, create_new, finish_writer
+from robot_io.mcap.walk import NO_SCHEMA, LogItem, Topic, walk
+from robot_io.mcap.write import McapWriter
 
 RECOVERED_METADATA = "recovered"
 
