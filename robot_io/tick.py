@@ -211,6 +211,11 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     pose_jumps: int = 0
     recorder_gone_ns: int = 0
     late_run: int = 0
+    first_fault: str = ""
+    """The row that first asked for HOLD or more, and still explains the mode; "" while there is none."""
+    first_value: float = float("nan")
+    """What was measured then, in the row's unit."""
+    first_fault_ns: int = 0
 
 
 class EnvelopeState(msgspec.Struct, frozen=True, gc=False):
@@ -249,6 +254,8 @@ class TickOutput(msgspec.Struct, frozen=True, gc=False):
     """Contact ball centre, m, WORLD frame."""
     finished: bool
     exit_code: int
+    fault_values: tuple[float, ...] = ()
+    """What was measured for each of `faults`, in the unit of its row; NaN where nothing is."""
 
 
 class ControlTick(msgspec.Struct, frozen=True, gc=False):

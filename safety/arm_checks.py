@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from robot_io.messages import ArmState, LinkState
 from robot_io.tick import ControlState, SafetyState, TickInput
+from safety.finding import NS_PER_MS, Finding
 from safety.settings import SafetySettings
 
 STALE_HOLD_NS = 40_000_000
@@ -27,29 +28,30 @@ def check(
         faults.append("F69")
     age_ns = inp.now_ns - arm.published_ns
     if age_ns > STALE_STOP_NS or arm.link == LinkState.LOST:
-        faults.append("F24-stop")
+        faults.append(Finding("F24-stop", age_ns / NS_PER_MS))
     elif age_ns > STALE_HOLD_NS:
-        faults.append("F24-hold")
+        faults.append(Finding("F24-hold", age_ns / NS_PER_MS))
     else:
         still_ns = inp.now_ns - arm.changed_ns
         if still_ns > STALE_STOP_NS:
-            faults.append("F25-stop")
+            faults.append(Finding("F25-stop", still_ns / NS_PER_MS))
         elif still_ns > STALE_HOLD_NS:
-            faults.append("F25-hold")
+            faults.append(Finding("F25-hold", still_ns / NS_PER_MS))
     if not all(math.isfinite(v) for v in (*joints.position, *joints.velocity)):
         return state, [*faults, "F29"]
     drift = max(abs(q - held) for q, held in zip(joints.position, control.held_joints, strict=True))
     if drift > settings.drift_stop:
-        faults.append("F20-stop")
+        faults.append(Finding("F20-stop", drift))
     elif drift > settings.drift_hold:
-        faults.append("F20-hold")
-    if any(abs(q - p) > settings.held_pose_tolerance for q, p in zip(joints.position, settings.held_pose, strict=True)):
-        faults.append("R04")
+        faults.append(Finding("F20-hold", drift))
+    off = max(abs(q - p) for q, p in zip(joints.position, settings.held_pose, strict=True))
+    if off > settings.held_pose_tolerance:
+        faults.append(Finding("R04", off))
     run = state.arm_velocity_run
     if arm.packets != state.arm_packets:
         run = run + 1 if max(map(abs, joints.velocity)) > MAX_JOINT_SPEED_RAD_PER_S else 0
     if run >= JOINT_SPEED_PACKETS:
-        faults.append("F21")
+        faults.append(Finding("F21", max(map(abs, joints.velocity))))
     faults += _of_state(settings, inp)
     return replace(state, arm_packets=arm.packets, arm_velocity_run=run), faults
 

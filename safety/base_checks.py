@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, Mode, SafetyState, TickInput
 from safety.envelope import OVERSPEED_FACTOR, too_fast
+from safety.finding import NS_PER_MS, Finding
 from safety.gate import Latch
 from safety.settings import SafetySettings
 
@@ -80,13 +81,13 @@ def _of_link(inp: TickInput) -> list[str]:
     elif base.latched or not inp.host.gate_alive:
         faults.append("F67")
     if inp.now_ns - base.published_ns > GATE_RECORD_STOP_NS:
-        faults.append("F67-late")
+        faults.append(Finding("F67-late", (inp.now_ns - base.published_ns) / NS_PER_MS))
     # Odometry itself, not just anything: every judgement of motion below rests on it.
     silent_ns = inp.now_ns - base.odometry_received_ns
     if silent_ns > STALE_STOP_NS:
-        faults.append("F31-stop")
+        faults.append(Finding("F31-stop", silent_ns / NS_PER_MS))
     elif silent_ns > STALE_HOLD_NS:
-        faults.append("F31-hold")
+        faults.append(Finding("F31-hold", silent_ns / NS_PER_MS))
     if base.status_received_ns and (base.status.stop_engaged or not base.status.drivers_active):
         faults.append("F38")
     return faults
@@ -99,9 +100,9 @@ def _of_pose(
     faults: list[str] = []
     age_ns = inp.now_ns - base.pose_received_ns
     if age_ns > max(POSE_STOP_PERIODS * settings.pose_period_ns, POSE_STOP_FLOOR_NS):
-        faults.append("F40-stop")
+        faults.append(Finding("F40-stop", age_ns / NS_PER_MS))
     elif age_ns > max(POSE_SLOW_PERIODS * settings.pose_period_ns, POSE_SLOW_FLOOR_NS):
-        faults.append("F40-slow")
+        faults.append(Finding("F40-slow", age_ns / NS_PER_MS))
     if not _usable(inp):
         return state, [*faults, "F42"]
     if base.pose_seq != state.pose_seq:
@@ -112,8 +113,9 @@ def _of_pose(
         state = replace(state, pose_seq=base.pose_seq, pose_jumps=jumps)
     if state.pose_jumps >= JUMPS:
         faults.append("F41")
-    if abs(math.remainder(pose.yaw - control.held_yaw, math.tau)) > settings.max_heading_error:
-        faults.append("F44")
+    turned = abs(math.remainder(pose.yaw - control.held_yaw, math.tau))
+    if turned > settings.max_heading_error:
+        faults.append(Finding("F44", turned))
     return state, faults
 
 
@@ -125,21 +127,21 @@ def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> 
     if base.odometry_seq != seq:
         run, seq = (run + 1 if too_fast(settings.envelope, twist) else 0), base.odometry_seq
     if run >= OVERSPEED_SAMPLES:
-        faults.append("F35")
+        faults.append(Finding("F35", speed))
     sent = base.sent
     off = math.hypot(twist.vx - sent.vx, twist.vy - sent.vy)
     ignored = max(IGNORE_SHARE * math.hypot(sent.vx, sent.vy), IGNORE_LEAST_M_PER_S)
     ignoring = off > ignored and state.mode >= Mode.PUSHING and state.mode < Mode.STOP
     ignore_since = (state.ignore_since_ns or inp.now_ns) if ignoring else 0
     if ignore_since and inp.now_ns - ignore_since >= IGNORE_NS:
-        faults.append("F33")
+        faults.append(Finding("F33", off))
     zero_ns = inp.now_ns - state.zero_since_ns if state.zero_since_ns else 0
     settled = zero_ns >= STOPPING_NS + settings.push_speed / BASE_DECELERATION * 1e9
     fresh = inp.now_ns - base.odometry_received_ns <= STALE_HOLD_NS  # an old speed says nothing of now
     moving = settled and fresh and speed > MOVING_M_PER_S and state.mode >= Mode.STOP
     moving_since = (state.moving_since_ns or inp.now_ns) if moving else 0
     if moving_since and inp.now_ns - moving_since >= MOVING_NS:
-        faults.append("F34")
+        faults.append(Finding("F34", speed))
     return replace(
         state,
         overspeed_run=run,

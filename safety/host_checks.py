@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from robot_io.tick import Operator, SafetyState, TickInput
+from safety.finding import NS_PER_MS, Finding
 from safety.settings import SafetySettings
 
 LATE_SLOW_TICKS = 3
@@ -20,10 +21,10 @@ def check(settings: SafetySettings, state: SafetyState, inp: TickInput) -> tuple
     if host.skipped:
         faults.append("F60-late")
     if run >= LATE_SLOW_TICKS or host.skipped * settings.period_ns >= LATE_SLOW_NS:
-        faults.append("F60-slow")
+        faults.append(Finding("F60-slow", host.skipped * settings.period_ns / NS_PER_MS))
     gone_ns = 0 if host.recorder_alive else state.recorder_gone_ns or inp.now_ns
     if gone_ns and inp.now_ns - gone_ns >= RECORDER_GONE_NS:
-        faults.append("F63")
+        faults.append(Finding("F63", (inp.now_ns - gone_ns) / NS_PER_MS))
     if inp.operator == Operator.STOP:
         faults.append("F64")
     return replace(state, late_run=run, recorder_gone_ns=gone_ns), faults

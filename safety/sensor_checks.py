@@ -8,7 +8,8 @@ from msgspec.structs import replace
 
 from robot_io.messages import LinkState
 from robot_io.tick import ControlState, SafetyState, TickInput
-from safety.settings import SafetySettings
+from safety.finding import NS_PER_MS, Finding
+from safety.settings import SATURATED, SafetySettings
 
 STALE_SLOW_NS = 50_000_000
 STALE_HOLD_NS = 80_000_000
@@ -36,13 +37,13 @@ def check(
         faults.append("F02")
     age_ns = inp.now_ns - last_ns
     if age_ns > STALE_STOP_NS:
-        faults.append("F01-stop")
+        faults.append(Finding("F01-stop", age_ns / NS_PER_MS))
     elif age_ns > STALE_HOLD_NS:
-        faults.append("F01-hold")
+        faults.append(Finding("F01-hold", age_ns / NS_PER_MS))
     elif age_ns > STALE_SLOW_NS:
-        faults.append("F01-slow")
+        faults.append(Finding("F01-slow", age_ns / NS_PER_MS))
     if settings.noise_floor and run >= settings.frozen_readings and control.speed > 0.0:
-        faults.append("F06")
+        faults.append(Finding("F06", run))
     return replace(state, last_ft_ns=last_ns, last_ft_force=force, last_ft_torque=torque, frozen_run=run), faults
 
 
@@ -54,7 +55,7 @@ def _of_reading(
 ) -> list[str]:
     if not all(math.isfinite(value) for value in (*force, *torque)):
         return ["F10"]
-    faults = []
+    faults: list[str] = []
     most = settings.saturated
     if (
         abs(force[0]) >= most[0]
@@ -64,18 +65,17 @@ def _of_reading(
         or abs(torque[1]) >= most[4]
         or abs(torque[2]) >= most[5]
     ):
-        faults.append("F07")
+        axes = zip((*force, *torque), most, strict=True)
+        faults.append(Finding("F07", max(abs(value) / limit for value, limit in axes) * SATURATED))
     if not control.tared:
         return faults
     bias, bias_torque = control.bias_force, control.bias_torque
     size = math.hypot(force[0] - bias[0], force[1] - bias[1], force[2] - bias[2])
     if size > settings.max_force:
-        faults.append("F50-stop")
+        faults.append(Finding("F50-stop", size))
     elif size > settings.slow_force:
-        faults.append("F50-slow")
-    if (
-        math.hypot(torque[0] - bias_torque[0], torque[1] - bias_torque[1], torque[2] - bias_torque[2])
-        > settings.max_torque
-    ):
-        faults.append("F51")
+        faults.append(Finding("F50-slow", size))
+    twisting = math.hypot(torque[0] - bias_torque[0], torque[1] - bias_torque[1], torque[2] - bias_torque[2])
+    if twisting > settings.max_torque:
+        faults.append(Finding("F51", twisting))
     return faults

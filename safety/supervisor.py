@@ -6,6 +6,8 @@ row says that it clears by itself. STOP and DEAD are latched: they end the run.
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 from msgspec.structs import replace
 
@@ -13,6 +15,7 @@ from robot_io.messages import BodyTwist
 from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Mode, Phase, SafetyState, TickInput
 from safety import arm_checks, base_checks, host_checks, sensor_checks, task_checks
 from safety.faults import FAULTS, Clears, strongest
+from safety.finding import value_of
 from safety.settings import SafetySettings
 
 CLEAN_NS = 1_000_000_000
@@ -30,6 +33,8 @@ class Verdict(msgspec.Struct, frozen=True, gc=False):
 
     mode: Mode
     faults: tuple[str, ...]
+    values: tuple[float, ...]
+    """What was measured for each of `faults`, in the unit of its row; NaN where nothing is measured just now."""
     finished: bool
     exit_code: int
 
@@ -50,15 +55,16 @@ def supervise(
     state, faults = _gather(settings, state, inp, control, wanted, clamped)
     faults = _after_pause(state, inp, faults)
     state = replace(state, grace_ticks=1 if _pause(state, inp) else 0)
-    new = tuple(i for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in state.latched)
+    new = tuple(str(i) for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in state.latched)
     latched = state.latched + new
     asked = max(strongest(tuple(faults)), strongest(latched))
     mode, state = _next_mode(replace(state, latched=latched), asked, control, inp.now_ns)
     stopping = mode >= Mode.STOP
     stop_since = (state.stop_since_ns or inp.now_ns) if stopping else 0
-    state = replace(state, mode=int(mode), stop_since_ns=stop_since)
+    state = _note_first(replace(state, mode=int(mode), stop_since_ns=stop_since), faults, inp.now_ns)
     finished, code = _ending(state, inp, control)
-    return state, Verdict(mode, tuple(dict.fromkeys([*latched, *faults])), finished, code)
+    values = {**dict.fromkeys(latched, math.nan), **{str(i): value_of(i) for i in faults}}
+    return state, Verdict(mode, tuple(values), tuple(values.values()), finished, code)
 
 
 def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
@@ -66,7 +72,23 @@ def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
     latched = tuple(dict.fromkeys([*state.latched, "F68"]))
     mode = max(Mode(state.mode), FAULTS["F68"].mode)
     state = replace(state, mode=int(mode), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
-    return state, Verdict(mode, latched, True, FAULTS["F68"].exit_code)
+    return state, Verdict(mode, latched, (math.nan,) * len(latched), True, FAULTS["F68"].exit_code)
+
+
+def _note_first(state: SafetyState, faults: list[str], now_ns: int) -> SafetyState:
+    """Keep the first cause of a HOLD or stronger: what follows it is a consequence, unless the run goes on without it.
+
+    Of several in one tick the strongest counts, and a stronger row of the same family replaces a weaker one.
+    """
+    if Mode.PUSHING <= state.mode < Mode.HOLD:
+        return replace(state, first_fault="", first_value=math.nan, first_fault_ns=0) if state.first_fault else state
+    first = state.first_fault
+    family = f"{first.split('-')[0]}-"
+    better = [i for i in faults if FAULTS[i].mode >= Mode.HOLD and (not first or f"{i}-".startswith(family))]
+    best = max(better, key=lambda i: FAULTS[i].mode, default="")
+    if not best or (first and FAULTS[best].mode <= FAULTS[first].mode):
+        return state
+    return replace(state, first_fault=str(best), first_value=value_of(best), first_fault_ns=now_ns)
 
 
 def note_command(state: SafetyState, command: BodyTwist, now_ns: int) -> SafetyState:

@@ -6,6 +6,7 @@ import math
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Phase, TickInput
+from safety.finding import NS_PER_MS, Finding
 
 START_NS = 5_000_000_000
 RESTLESS_NS = 5_000_000_000
@@ -23,7 +24,7 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
     faults: list[str] = []
     phase = control.phase
     if phase == Phase.SETTLE and inp.now_ns - first_ns > START_NS:
-        faults.append("R01")
+        faults.append(Finding("R01", (inp.now_ns - first_ns) / NS_PER_MS))
     if phase == Phase.TARE and control.refusal:
         faults.append(_REFUSALS[control.refusal])
     if not control.rest_since_ns and inp.now_ns - control.phase_since_ns > RESTLESS_NS:
@@ -36,9 +37,9 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
     if phase == Phase.LOST_HOLD:
         faults.append("F52-hold" if control.contact_seen else "F53")
     if control.backward_ticks >= BACKWARD_TICKS:
-        faults.append("F56")
+        faults.append(Finding("F56", control.backward_ticks))
     if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):
         faults.append("F58")
     if control.residual_N > RESIDUAL_N:
-        faults.append("F09")
+        faults.append(Finding("F09", control.residual_N))
     return faults

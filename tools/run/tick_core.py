@@ -42,6 +42,7 @@ class TickCore(msgspec.Struct, frozen=True):
                 0.0,
                 True,
                 verdict.exit_code,
+                verdict.values,
             )
         pose = trusted_pose(self.safety, state.safety, inp)
         seen = inp if pose is inp.base.pose else replace(inp, base=replace(inp.base, pose=pose))
@@ -60,6 +61,7 @@ class TickCore(msgspec.Struct, frozen=True):
             wanted.contact_y,
             verdict.finished,
             verdict.exit_code,
+            verdict.values,
         )
 
 
