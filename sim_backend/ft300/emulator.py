@@ -132,7 +132,7 @@ class Ft300Emulator:
 
     def _on_sample(self, sample_ns: int) -> None:
         self._registers.counts = wire.to_counts(self._source.read_ft(sample_ns))
-        self._look_at_baud()
+        self._check_baud()
         self._counted["samples"] += 1
         if self._streaming and not self._is_stalled(sample_ns):
             self._send_packet(sample_ns)
@@ -147,20 +147,20 @@ class Ft300Emulator:
     def _send_packet(self, sample_ns: int) -> None:
         self._packets += 1
         knobs = self.knobs
-        if self._to_host.is_busy(sample_ns) or self._is_turn(knobs.drop_packet_every):
+        if self._to_host.is_busy(sample_ns) or self._is_every_nth(knobs.drop_packet_every):
             self._counted["packets_withheld"] += 1
             return
         packet = bytearray(wire.stream_packet(self._registers.counts))
-        if self._is_turn(knobs.corrupt_every):
+        if self._is_every_nth(knobs.corrupt_every):
             packet[5] ^= 0x10
-        if self._is_turn(knobs.drop_byte_every):
+        if self._is_every_nth(knobs.drop_byte_every):
             del packet[7]
-        if self._is_turn(knobs.insert_byte_every):
+        if self._is_every_nth(knobs.insert_byte_every):
             packet.insert(9, 0x20)
         self._counted["packets_sent"] += 1
         self._send(bytes(packet), sample_ns)
 
-    def _is_turn(self, every: int) -> bool:
+    def _is_every_nth(self, every: int) -> bool:
         return every > 0 and self._packets % every == 0
 
     # From the sensor to the host: line, adapter, pty.
@@ -194,13 +194,13 @@ class Ft300Emulator:
         self._counted["bytes_garbled"] += len(data)
         return bytes(byte * 167 + 13 & 0xFF for byte in data)
 
-    def _look_at_baud(self) -> None:
+    def _check_baud(self) -> None:
         self._baud_fits = bool(self._port.path) and self._port.baud_is(termios.B19200)
 
     # From the host to the sensor.
 
     def _on_bytes(self, data: bytes) -> None:
-        self._look_at_baud()
+        self._check_baud()
         if not self._baud_fits:
             data = self._garbled(data)
         self._to_sensor.put(data, monotonic_ns())
@@ -237,7 +237,7 @@ class Ft300Emulator:
         pause_ns = began_ns - self._heard_until_ns
         self._heard_until_ns = min(self._to_sensor.free_ns, now_ns)
         if self._streaming:
-            data = self._look_for_stop(data, now_ns)
+            data = self._find_stop(data, now_ns)
         if data and now_ns >= self._modbus_from_ns:
             if pause_ns > REQUEST_PAUSE_NS:
                 self._scanner.clear()
@@ -245,7 +245,7 @@ class Ft300Emulator:
                 self._counted["requests"] += 1
                 self._serve(request, now_ns)
 
-    def _look_for_stop(self, data: bytes, now_ns: int) -> bytes:
+    def _find_stop(self, data: bytes, now_ns: int) -> bytes:
         """Count 0xFF; whatever else is said to a streaming sensor is ignored. Return what came after the stop."""
         for index, byte in enumerate(data, 1):
             self._stop_bytes_seen = self._stop_bytes_seen + 1 if byte == wire.STOP_BYTE else 0

@@ -11,7 +11,7 @@ from sim_backend.ft300 import wire
 
 REG_WRENCH, REG_ACCELERATION, REG_OUTPUT = 180, 190, 410
 OUTPUT_STREAM = 0x0200
-MOST_STDERR_BYTES = 125
+MOST_REGISTERS = 125
 
 
 class Reply(msgspec.Struct, frozen=True, gc=False):
@@ -51,7 +51,7 @@ class SensorRegisters:
         return _refused(function, wire.ILLEGAL_FUNCTION)
 
     def _read(self, address: int, count: int) -> Reply:
-        if not 1 <= count <= MOST_STDERR_BYTES:
+        if not 1 <= count <= MOST_REGISTERS:
             return _refused(wire.FC_READ, wire.ILLEGAL_VALUE)
         words = []
         for offset in range(count):

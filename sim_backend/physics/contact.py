@@ -99,7 +99,7 @@ class PushedSlider:
             self._outcome = FREE
             return FREE
         if ball_from != self._ball:
-            self._placed(x, y)
+            self._place_ball(x, y)
         self._ball = ball_to
         if not self._touching:
             reach = self._outline.bounding_radius_m + self._radius + moved + TOUCH_M
@@ -107,21 +107,21 @@ class PushedSlider:
                 self._outcome = FREE
                 return FREE
         if moved <= self._piece_m:
-            self._outcome = self._piece(x, y, ball_to[0], ball_to[1], dt_s)
+            self._outcome = self._advance_piece(x, y, ball_to[0], ball_to[1], dt_s)
             return self._outcome
         pieces = min(ceil(moved / self._piece_m), MOST_PIECES)
         for i in range(1, pieces + 1):
             last = i == pieces
             to_x, to_y = ball_to if last else (ball_from[0] + dx * i / pieces, ball_from[1] + dy * i / pieces)
-            self._outcome = self._piece(x, y, to_x, to_y, dt_s / pieces)
+            self._outcome = self._advance_piece(x, y, to_x, to_y, dt_s / pieces)
             x, y = to_x, to_y
         return self._outcome
 
-    def _piece(self, x: float, y: float, to_x: float, to_y: float, dt_s: float) -> ContactOutcome:
+    def _advance_piece(self, x: float, y: float, to_x: float, to_y: float, dt_s: float) -> ContactOutcome:
         """Advance by one short straight motion of the ball."""
         vx, vy = (to_x - x) / dt_s, (to_y - y) / dt_s
         if hypot(vx, vy) < REST_M_PER_S:
-            return self._held()
+            return self._outcome_at_rest()
         done = 0.0
         if not self._touching:
             touch = self._first_touch(x, y, to_x - x, to_y - y)
@@ -133,7 +133,7 @@ class PushedSlider:
             left = (1.0 - done) * dt_s
             v_body_x = self._cos * vx + self._sin * vy
             v_body_y = self._cos * vy - self._sin * vx
-            solution = self._answer(v_body_x, v_body_y)
+            solution = self._respond(v_body_x, v_body_y)
             if not isinstance(solution, Moving):
                 # leaving, or brushing along the face without a normal motion: no force is needed for either
                 self._touching, self._corner = False, -1
@@ -147,15 +147,15 @@ class PushedSlider:
                 break
         return outcome
 
-    def _answer(self, vx: float, vy: float) -> ContactSolution:
+    def _respond(self, vx: float, vy: float) -> ContactSolution:
         """Return how the slider answers the ball's velocity (BODY, m/s); notes the push, and the face at a corner."""
         floor = self._floor
         solution: ContactSolution = SEPARATING
         # where the floor holds hangs on the push, and the push on where it holds: last step's push is only a guess
         for _ in range(2 if floor is not None and floor.follows_push else 1):
             if floor is not None:
-                self._take_grip(floor)
-            solution = self._solved(vx, vy)
+                self._update_grip(floor)
+            solution = self._solve_contact(vx, vy)
             if not isinstance(solution, Moving):
                 break
             self._push_x, self._push_y = solution.fx, solution.fy
@@ -163,7 +163,7 @@ class PushedSlider:
             self._corner = -1
         return solution
 
-    def _solved(self, vx: float, vy: float) -> ContactSolution:
+    def _solve_contact(self, vx: float, vy: float) -> ContactSolution:
         """Solve the contact as it stands, on a face or at a corner."""
         if self._corner < 0:
             return self._solve(
@@ -187,13 +187,13 @@ class PushedSlider:
             if fraction is None:
                 return None
             nearest = self._outline.nearest(bx + fraction * b_dx, by + fraction * b_dy)
-        self._take_contact(nearest)
+        self._set_contact(nearest)
         if self._corner < 0 and self._nx * b_dx + self._ny * b_dy < 0.0:
             return None
         self._touching = True
         return fraction
 
-    def _take_contact(self, nearest: Nearest) -> None:
+    def _set_contact(self, nearest: Nearest) -> None:
         _, self._nx, self._ny, self._cx, self._cy, self._face = nearest
         self._push_x, self._push_y = self._nx, self._ny
         self._corner = -1
@@ -202,7 +202,7 @@ class PushedSlider:
                 if hypot(row[7] - self._cx, row[8] - self._cy) < TOUCH_M:
                     self._corner, self._cx, self._cy = corner, row[7], row[8]
 
-    def _take_grip(self, floor: Floor) -> None:
+    def _update_grip(self, floor: Floor) -> None:
         """Ask the floor what holds the slider now; the push is along the force so far, at a first touch the normal."""
         size = hypot(self._push_x, self._push_y)
         self._cof_x, self._cof_y, self._d, self._f_max, self._grain = floor.grip(
@@ -252,17 +252,17 @@ class PushedSlider:
         self._cx, self._cy = (high_x, high_y) if slip > 0.0 else (low_x, low_y)
         return share
 
-    def _placed(self, x: float, y: float) -> None:
+    def _place_ball(self, x: float, y: float) -> None:
         """Take a ball that did not come from where the last step left it; an overlap pushes the slider out."""
         nearest = self._outline.nearest(*self._to_body(x, y))
-        self._take_contact(nearest)
+        self._set_contact(nearest)
         gap = self._radius - nearest[0]
         self._touching = self._touching and gap >= -TOUCH_M
         if gap > 0.0:
             self.x_m += gap * (self._cos * self._nx - self._sin * self._ny)
             self.y_m += gap * (self._sin * self._nx + self._cos * self._ny)
 
-    def _held(self) -> ContactOutcome:
+    def _outcome_at_rest(self) -> ContactOutcome:
         """Answer a ball at rest: the force of the last motion stays as long as they touch."""
         last = self._outcome
         if not self._touching or last.mode in (ContactMode.FREE, ContactMode.HOLDING):

@@ -13,7 +13,7 @@ from robot_io.clock import monotonic_ns
 from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.fields import WIRE_FORMAT, Input, Output, Values, input_field, output_field
-from sim_backend.ur10.seen import Seen
+from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.tcp import TcpClient, TcpServer
 
 RTDE_PORT = 30004
@@ -79,7 +79,7 @@ class RtdeClient(TcpClient):
         while self.open and len(self._pending) >= _HEADER.size:
             length, kind = _HEADER.unpack_from(self._pending)
             if length < _HEADER.size:
-                self.rtde.seen.bad_frames += 1
+                self.rtde.requests.bad_frames += 1
                 self.close()
                 return
             if len(self._pending) < length:
@@ -126,7 +126,7 @@ class RtdeClient(TcpClient):
 
     def _on_frame(self, kind: str, body: bytes) -> None:
         if kind != "U":
-            self.rtde.seen.handshake.append(f"{kind} {body[:60]!r}")
+            self.rtde.requests.handshake.append(f"{kind} {body[:60]!r}")
         handler = {
             "V": self._on_protocol,
             "v": self._on_version,
@@ -138,7 +138,7 @@ class RtdeClient(TcpClient):
             "M": self._on_text,
         }.get(kind)
         if handler is None:
-            self.rtde.seen.bad_frames += 1
+            self.rtde.requests.bad_frames += 1
         else:
             handler(body)
 
@@ -155,7 +155,7 @@ class RtdeClient(TcpClient):
         frequency_hz = CYCLE_HZ
         if self.version == 2:
             if len(body) < 8:
-                self.rtde.seen.bad_frames += 1
+                self.rtde.requests.bad_frames += 1
                 return
             (frequency_hz,) = struct.unpack_from(">d", body)
             body = body[8:]
@@ -171,7 +171,7 @@ class RtdeClient(TcpClient):
         self.reply("O", (bytes([complete]) if self.version == 2 else b"") + types.encode())
 
     def _on_inputs(self, body: bytes) -> None:
-        self.rtde.seen.input_setups += 1
+        self.rtde.requests.input_setups += 1
         owners = self.rtde.owners
         names = _names(body)
         types: list[str] = []
@@ -201,11 +201,11 @@ class RtdeClient(TcpClient):
         self.reply("P", b"\x01")
 
     def _on_data(self, body: bytes) -> None:
-        seen = self.rtde.seen
-        seen.input_frames += 1
+        requests = self.rtde.requests
+        requests.input_frames += 1
         number = body[0] if body else 0
         if not 1 <= number <= len(self.inputs) or len(body) != 1 + self.inputs[number - 1].size:
-            seen.bad_frames += 1
+            requests.bad_frames += 1
             return
         self.inputs[number - 1].write(self.rtde.robot, body[1:], monotonic_ns())
 
@@ -216,9 +216,9 @@ class RtdeClient(TcpClient):
 class RtdeServer(TcpServer):
     """The RTDE port: clients, who owns which input, and the data of each cycle."""
 
-    def __init__(self, loop: EventLoop, host: str, robot: UrController, seen: Seen) -> None:
+    def __init__(self, loop: EventLoop, host: str, robot: UrController, requests: RequestLog) -> None:
         self.robot = robot
-        self.seen = seen
+        self.requests = requests
         self.owners: dict[str, RtdeClient] = {}
         self.muted = False
         self.counters = {"data_sent": 0, "data_dropped": 0}

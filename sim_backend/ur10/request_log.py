@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 
-class Seen:
+class RequestLog:
     """Everything of note that clients sent; the newest 2000 lines of each list."""
 
     def __init__(self) -> None:
