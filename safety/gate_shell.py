@@ -156,7 +156,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         return replace(self, record=record)
 
     def ends(self, now_ns: int, link: LinkState) -> bool:
-        """Return whether control is gone and zeros went out for long enough, until the base rested, or the link is lost."""
+        """Return whether control is gone and zeros were sent long enough, the base rests, or the link is lost."""
         if not self.zeros_since_ns:
             return False
         return now_ns >= self.zeros_since_ns + LAST_ZEROS_NS or link == LinkState.LOST or self._at_rest()

@@ -1,6 +1,6 @@
 """The registers of an emulated FT 300 and its answers to Modbus requests. Pure.
 
-Documented are functions 3 and 16 and the registers below; a real sensor's answer to anything else is not known.
+Functions 3 and 16 and the registers below are documented; a real sensor's answer to anything else is unknown.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ MOST_REGISTERS = 125
 
 
 class Reply(msgspec.Struct, frozen=True, gc=False):
-    """An answer, and the output that the request selected (None when it selected none)."""
+    """An answer, and the output that the request selected (None: no output selected)."""
 
     answer: bytes
     selected: int | None = None
@@ -41,7 +41,7 @@ class SensorRegisters:
         return self._words.get(address)
 
     def serve(self, request: bytes) -> Reply:
-        """Answer a request (without its CRC). What it selects takes effect with the answer, not here."""
+        """Answer a request (without its CRC). A selected output takes effect when the answer is sent, not here."""
         function = request[1]
         address = request[2] << 8 | request[3]
         if function == wire.FC_READ:

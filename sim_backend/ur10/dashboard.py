@@ -1,4 +1,4 @@
-"""The dashboard server of the emulated controller (port 29999): one command a line, one reply a line.
+"""The dashboard server of the emulated controller (port 29999): one command and one reply per line.
 
 Source: Universal Robots dashboard server manual, CB3.
 """

@@ -1,6 +1,6 @@
 """RTDE on the emulated controller (port 30004), protocol versions 1 and 2. Source: Universal Robots RTDE guide.
 
-frame: uint16 length (with these 3 bytes) | uint8 type | payload, all big-endian
+frame: uint16 length (including these 3 bytes) | uint8 type | payload, all big-endian
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ _INFO_LEVEL = 3
 
 
 class OutputRecipe:
-    """What a client wants to read, in its order."""
+    """The variables that a client reads, in its order."""
 
     def __init__(self, fields: list[Output]) -> None:
         self._fields = fields
         self._layout = struct.Struct(">" + "".join(WIRE_FORMAT[field.type] for field in fields))
 
     def pack(self, robot: UrController) -> bytes:
-        """Return the values of this moment."""
+        """Return the current values."""
         values: list[float] = []
         for field in self._fields:
             values.extend(field.read(robot))
@@ -41,7 +41,7 @@ class OutputRecipe:
 
 
 class InputRecipe:
-    """What a client wants to write, in its order."""
+    """The variables that a client writes, in its order."""
 
     def __init__(self, fields: list[Input]) -> None:
         self._fields = fields
@@ -49,7 +49,7 @@ class InputRecipe:
         self.size = sum(layout.size for layout in self._layouts)
 
     def write(self, robot: UrController, data: bytes, now_ns: int) -> None:
-        """Put the values into the controller."""
+        """Write the values to the controller."""
         at = 0
         for field, layout in zip(self._fields, self._layouts, strict=True):
             values: Values = layout.unpack_from(data, at)
@@ -89,7 +89,7 @@ class RtdeClient(TcpClient):
             self._on_frame(chr(kind), body)
 
     def on_closed(self) -> None:
-        """Give back the inputs; their values stay."""
+        """Release the inputs; their values are kept."""
         self.rtde.owners = {name: owner for name, owner in self.rtde.owners.items() if owner is not self}
 
     def reply(self, kind: str, body: bytes) -> None:
@@ -105,7 +105,7 @@ class RtdeClient(TcpClient):
             self.reply("M", bytes([len(message)]) + message + bytes([len(origin)]) + origin + bytes([level]))
 
     def send_data(self) -> None:
-        """Send one data frame when this client's rate asks for one in this cycle."""
+        """Send one data frame if this client's rate requires one in this cycle."""
         if not self.started or self.output is None:
             return
         self._due += self.frequency_hz / CYCLE_HZ
@@ -167,7 +167,7 @@ class RtdeClient(TcpClient):
         if complete:
             self.output = OutputRecipe(found)
             self.frequency_hz = min(max(frequency_hz, 1.0), CYCLE_HZ) if math.isfinite(frequency_hz) else CYCLE_HZ
-            self._due = 1.0 - self.frequency_hz / CYCLE_HZ  # the first frame leaves with the first cycle
+            self._due = 1.0 - self.frequency_hz / CYCLE_HZ  # the first frame is sent in the first cycle
         self.reply("O", (bytes([complete]) if self.version == 2 else b"") + types.encode())
 
     def _on_inputs(self, body: bytes) -> None:
@@ -210,11 +210,11 @@ class RtdeClient(TcpClient):
         self.inputs[number - 1].write(self.rtde.robot, body[1:], monotonic_ns())
 
     def _on_text(self, body: bytes) -> None:
-        """A text message of a client goes to the robot's log; nothing is answered."""
+        """Ignore a client's text message: it only goes to the robot's log."""
 
 
 class RtdeServer(TcpServer):
-    """The RTDE port: clients, who owns which input, and the data of each cycle."""
+    """The RTDE port: clients, the owner of each input, and the data of each cycle."""
 
     def __init__(self, loop: EventLoop, host: str, robot: UrController, requests: RequestLog) -> None:
         self.robot = robot
@@ -233,7 +233,7 @@ class RtdeServer(TcpServer):
                 client.send_data()
 
     def read_now(self) -> None:
-        """Take what clients have already sent, before a late cycle judges by it."""
+        """Read what clients have already sent, before a late cycle acts on it."""
         for client in tuple(self.rtde_clients):
             client.read_now()
 
@@ -244,5 +244,5 @@ class RtdeServer(TcpServer):
 
 
 def _names(body: bytes) -> list[str]:
-    """Names of a comma list; ur_rtde ends its lists with a comma."""
+    """Return the names in a comma-separated list; ur_rtde ends its lists with a comma."""
     return [name.strip() for name in body.decode("ascii", "replace").split(",") if name.strip()]

@@ -1,6 +1,6 @@
 """Script upload on the emulated controller (ports 30001, 30002, 30003): text in, nothing out.
 
-A program is `def name():` up to an `end` as far in as its `def` (blocks inside it are further in); `sec name():`
+A program is `def name():` up to an `end` with the same indentation (inner blocks are indented further); `sec name():`
 runs beside the program; any other line is a program of its own. The state streams of these ports are not emulated.
 """
 
@@ -57,7 +57,7 @@ class ScriptClient(TcpClient):
 
 
 def script_servers(loop: EventLoop, host: str, robot: UrController, requests: RequestLog) -> list[TcpServer]:
-    """Listen on the three script ports. Raises EnvironmentFault; then none stays open."""
+    """Listen on the three script ports. Raises EnvironmentFault, leaving none open."""
     servers: list[TcpServer] = []
     try:
         for port in SCRIPT_PORTS:

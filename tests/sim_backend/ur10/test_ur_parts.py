@@ -17,8 +17,8 @@ from sim_backend.ur10.emulator import CB3_VERSION, UrEmulator
 from sim_backend.ur10.kinematics import flange_pose, rotation_vector
 from sim_backend.ur10.modes import RobotMode, SafetyMode, joint_mode, robot_status_bits, safety_bits
 from sim_backend.ur10.registers import Registers, Watchdog
-from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.request_log import RequestLog
+from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.standalone import HELD_POSE_RAD, StillArm
 from sim_backend.world.plant import ArmTruth
 from tests.wire.ur_process import fresh_address
