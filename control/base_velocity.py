@@ -1,4 +1,4 @@
-"""From a wanted WORLD velocity to the command the base takes in its BODY frame, with the heading held."""
+"""Converts a wanted WORLD velocity into the BODY-frame command for the base, and holds the heading."""
 
 from __future__ import annotations
 
@@ -20,6 +20,6 @@ def contact_point_world(x: float, y: float, yaw: float, contact_x: float, contac
     """Return the centre of the contact ball in the WORLD frame, m.
 
     x, y, yaw: measured pose of the base. contact_x, contact_y: ball centre in the BODY frame. The point where
-    ball and object touch differs from the centre by R sin(angle) sideways, R being the ball's radius.
+    ball and object touch is offset sideways from the centre by R sin(angle), where R is the ball's radius.
     """
     return point_outside(x, y, yaw, contact_x, contact_y)

@@ -1,8 +1,8 @@
-"""The fixed-rate loop: the one impure room of control.
+"""The fixed-rate loop: the only impure module of control.
 
 One thread, one epoll: absolute deadlines from a timerfd, and the sensor's own descriptor, so that every packet
-gets an honest arrival stamp. A tick drains everything without blocking, folds, sends one frame to the gate and
-pushes one record into the log ring. Nothing here waits for anything but the next deadline.
+gets its true arrival time. A tick drains all devices without blocking, folds the input into the state, sends one frame
+to the gate and pushes one record into the log ring. The loop only ever waits for the next deadline or a descriptor.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ from robot_io.tick import (
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
 LOG_LOST = b"L"[0]
-"""The launcher says that the recorder cannot write any more: as good as gone."""
+"""The launcher reports that the recorder can no longer write: treated as if it were gone."""
 FLOOD_S = 0.64
-"""More packets in one tick than the sensor gives in this time are a flood; the oldest go."""
+"""More packets in one tick than the sensor sends in this time are a flood; the oldest are dropped."""
 
 Fold = Callable[[TickState, TickInput], tuple[TickState, TickOutput]]
 
@@ -69,7 +69,7 @@ class Arm(Protocol):
 
 
 class Watch:
-    """Descriptors that say when another process is gone (pidfds), by name."""
+    """Descriptors (pidfds), by name, that report when another process has ended."""
 
     def __init__(self, **pidfds: int) -> None:
         self.pidfds = pidfds
@@ -77,7 +77,7 @@ class Watch:
 
 
 class ControlLoop:
-    """Runs ticks until the fold says finished; `timing` and `last` tell how it went."""
+    """Runs ticks until the fold reports that it has finished; `timing` and `last` hold the results."""
 
     def __init__(
         self,
@@ -121,7 +121,7 @@ class ControlLoop:
         self.error: BaseException | None = None
 
     def run(self) -> None:
-        """Serve until finished. An exception in a tick sends zero, is logged as F68, and is left in `error`."""
+        """Run until finished. An exception in a tick sends zero, is logged as F68, and is kept in `error`."""
         self._sensor_fd = self._sensor.fileno()
         self._loop.add_fd(self._sensor_fd, self._on_sensor)
         self._loop.add_fd(self._operator_fd, self._on_operator)
@@ -135,7 +135,7 @@ class ControlLoop:
             self._loop.close()
 
     def stop_requested(self) -> None:
-        """Pass on a stop that reached this process itself (SIGTERM); safe in a signal handler."""
+        """Request a stop because this process itself received SIGTERM; safe in a signal handler."""
         self._operator = Operator.STOP
 
     def _on_sensor(self, _events: int) -> None:
@@ -144,7 +144,7 @@ class ControlLoop:
             self._loop.remove_fd(self._sensor_fd)
 
     def _collect(self) -> None:
-        """Take every new reading; what somebody else's driver raises is left for the next tick to give up on."""
+        """Collect every new reading; keep a third-party driver's exception, on which the next tick gives up."""
         if self._sensor_error is not None:
             return
         try:
@@ -155,7 +155,7 @@ class ControlLoop:
             self._loop.remove_fd(self._sensor_fd)
             return
         now_ns = self._clock()
-        for reading in readings:  # a stamp from the future would never grow old
+        for reading in readings:  # a stamp from the future would never become stale
             self._readings.append(reading if reading.received_ns <= now_ns else replace(reading, received_ns=now_ns))
         self._taken += len(readings)
         del self._readings[: -self._most_readings]
@@ -186,13 +186,13 @@ class ControlLoop:
         self._timer = self._loop.call_at(paced.next_deadline_ns, self._on_deadline)
         self._tick += 1 + paced.skipped
         self._collect()
-        # Drained first: packets that waited during a pause are in before anybody judges their age.
+        # Drained first: packets that arrived during a pause are read before their age is judged.
         inp = self._input(self._clock(), paced.late_ns, paced.skipped)
         try:
             if self._sensor_error is not None:
                 raise self._sensor_error
             self._one_tick(inp)
-        except Exception as error:  # the loop's top: whatever failed up there, the base gets zero and the log says so
+        except Exception as error:  # top level of the loop: whatever failed, the base gets zero and the log records it
             self._give_up(inp, error)
         self.last_ns = now_ns
         self.timing.note(paced.late_ns, paced.skipped, self._clock() - now_ns)
@@ -268,7 +268,7 @@ class ControlLoop:
 def ft_input(
     readings: list[Stamped[SensorWrench]] | tuple[Stamped[SensorWrench], ...], health: DeviceHealth, taken: int
 ) -> FtInput:
-    """Return the sensor's part of a tick's input; `taken` counts all readings, for a driver that does not."""
+    """Return the sensor's part of a tick's input; `taken`: all readings so far, if the driver does not count them."""
     counters = health.counters
     return FtInput(
         tuple(

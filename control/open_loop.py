@@ -1,4 +1,4 @@
-"""The baseline of the paper's experiment: straight along the path, whatever the force says."""
+"""The baseline of the paper's experiment: straight along the path, regardless of the force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pure pacing: absolute deadlines on a fixed grid, whole periods skipped and counted, never a burst."""
+"""Pure pacing: absolute deadlines on a fixed grid; missed periods are skipped and counted, never made up for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import msgspec
 
 
 class Wake(msgspec.Struct, frozen=True, gc=False):
-    """What the pacer says of one wake-up: its deadline, lateness (ns), skipped periods, and the next deadline."""
+    """One wake-up: its deadline, lateness (ns), skipped periods, and the next deadline."""
 
     deadline_ns: int
     late_ns: int
@@ -15,10 +15,10 @@ class Wake(msgspec.Struct, frozen=True, gc=False):
 
 
 def wake(deadline_ns: int, period_ns: int, now_ns: int) -> Wake:
-    """Judge a wake-up at `now_ns` for `deadline_ns`.
+    """Evaluate a wake-up at `now_ns` for `deadline_ns`.
 
-    Skips as many whole periods as have passed and keeps the phase of the grid: the tick that runs now belongs
-    to the newest deadline not after `now_ns`.
+    Skips every full period that has passed and keeps the phase of the grid: the tick that runs now belongs
+    to the latest deadline not after `now_ns`.
     """
     skipped = max(0, (now_ns - deadline_ns) // period_ns)
     served_ns = deadline_ns + skipped * period_ns

@@ -1,4 +1,4 @@
-"""What a run says of itself at the end: when faults came and went, how often each came, and how it ended."""
+"""Notes of a run for its summary: when faults appeared and cleared, how often each occurred, and how it ended."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ MOST_EVENTS = 200
 
 
 class RunNotes:
-    """Collects when the set of active faults changed, with the mode of that tick, and how often each fault came.
+    """Records when the set of active faults changed, with the mode of that tick, and how often each fault occurred.
 
-    At most MOST_EVENTS events; the counts go on.
+    At most MOST_EVENTS events are kept; counting continues beyond that.
     """
 
     def __init__(self) -> None:
@@ -20,7 +20,7 @@ class RunNotes:
         self._first_ns = 0
 
     def note(self, inp: TickInput, output: TickOutput) -> None:
-        """Note one tick."""
+        """Record one tick."""
         if not self._first_ns:
             self._first_ns = inp.now_ns
         if (output.mode, output.faults) == self._last:
@@ -41,7 +41,7 @@ class RunNotes:
 
 
 def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
-    """Return the figures of the end of a run (m, N)."""
+    """Return the final figures of a run (m, N)."""
     control = state.control
     ended = control.phase in (Phase.RETREAT, Phase.CHECK, Phase.DONE, Phase.FAILED)
     return {

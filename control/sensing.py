@@ -1,4 +1,4 @@
-"""Every packet of the sensor, in order: sums for tare and check; bias, rotation, sign, filter, each with its own dt."""
+"""Processes every sensor packet in order: sums for tare and check; bias, rotation, sign, and filter with its own dt."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def sense(
         force = sample if fresh else low_pass(force, sample, dt_s, control.force_filter_tau_s)
         fresh = False
         last_ns = reading.received_ns
-        # The direction of contact is unknown, so contact is a matter of size alone; "not >=" also ends on NaN.
+        # The direction of contact is unknown, so only the magnitude counts; "not >=" is also true for NaN.
         run = run + 1 if math.hypot(force[0], force[1]) >= control.force_min_N else 0
     finite = math.isfinite(force[0]) and math.isfinite(force[1]) and math.isfinite(force[2])
     valid = finite and now_ns - last_ns <= VALID_FOR_NS

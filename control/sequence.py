@@ -1,4 +1,4 @@
-"""The sequence of a push: settle, tare, approach, push (and lose, and find again), rest, retreat, check."""
+"""The phases of a push: settle, tare, approach, push (with loss and recovery of contact), rest, retreat, check."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Operator, Phase, 
 
 FRESH_NS = 100_000_000
 SETTLE_PACKETS = 20
-"""Packets of each device before the start is believed."""
+"""Packets needed from each device before the run starts."""
 OVERDUE_CONTACT_M = 0.5
-"""No contact this far beyond where it was expected: the object is not there."""
+"""Without contact this far beyond the expected place, the object is considered missing."""
 BACKWARD_RAD = math.pi / 2
 S = 1e-9
 
@@ -28,12 +28,12 @@ def advance(
 ) -> ControlState:
     """Return the state after the phase logic of one tick.
 
-    contact: the ball centre in the WORLD frame. held: the supervisor held the base in the tick before.
+    contact: the ball centre in the WORLD frame. held: the supervisor held the base in the previous tick.
     """
     along = settings.path.along(*contact)
     progress = along - state.contact_from_m if state.contact_seen else 0.0
     lateral = settings.path.lateral(*contact)
-    if math.isfinite(progress) and math.isfinite(lateral):  # before the first good pose they are not
+    if math.isfinite(progress) and math.isfinite(lateral):  # they are not before the first valid pose
         state = replace(state, progress_m=progress, lateral_m=lateral)
     state = _note_rest(state, inp)
     phase = Phase(state.phase)
@@ -63,10 +63,10 @@ def _enter(state: ControlState, phase: Phase, now_ns: int, **changes: object) ->
 
 
 def _wait(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
-    """Stand still in time: no deadline of a phase runs while the base is held, and the speed ramps up afterwards."""
+    """Suspend the phase's timers while the base is held, so that the speed ramps up again afterwards."""
     since = state.phase_since_ns + round(settings.period_s * (1 + inp.host.skipped) / S)
     if state.phase == Phase.APPROACH:
-        since = inp.now_ns  # its ramp counts from there
+        since = inp.now_ns  # its ramp starts from here
     return replace(state, phase_since_ns=since, ramp_since_ns=inp.now_ns, ramp_from_speed=0.0)
 
 
@@ -78,12 +78,12 @@ def _note_rest(state: ControlState, inp: TickInput) -> ControlState:
 
 
 def _rested(state: ControlState, now_ns: int, for_ns: int) -> bool:
-    # Rest counts from the phase's own start: the base also stands still before it has begun to move.
+    # Rest counts only from the start of the phase: the base is also at rest before it has started to move.
     return state.rest_since_ns > 0 and now_ns - max(state.rest_since_ns, state.phase_since_ns) >= for_ns
 
 
-def everyone_spoke(settings: Settings, state: ControlState, inp: TickInput) -> bool:
-    """Return whether every device has given enough fresh data to start."""
+def all_devices_sent_data(settings: Settings, state: ControlState, inp: TickInput) -> bool:
+    """Return whether every device has sent enough fresh data to start."""
     arm, base = inp.arm, inp.base
     return (
         inp.ft.packets_ok >= settings.settle_readings
@@ -100,17 +100,17 @@ def everyone_spoke(settings: Settings, state: ControlState, inp: TickInput) -> b
 
 
 def _settle(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
-    if not everyone_spoke(settings, state, inp):
+    if not all_devices_sent_data(settings, state, inp):
         return state
     held = replace(state, held_yaw=inp.base.pose.yaw, approach_from_m=along)
     if settings.in_contact:
-        # A saved tare holds at the joints it was taken at: those stay, and a moved arm is a fault (F20).
+        # A saved tare is valid only at the joints where it was taken: those are kept, and a moved arm is a fault (F20).
         return _enter(held, Phase.APPROACH, inp.now_ns)
     return _enter(held, Phase.TARE, inp.now_ns, held_joints=inp.arm.joints.position)
 
 
 def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
-    if not state.rest_since_ns:  # somebody drives the base by hand: only what is measured at rest counts
+    if not state.rest_since_ns:  # somebody is moving the base: only readings at rest count
         return replace(state, tare=TareSums())
     if state.refusal or state.tare.count < settings.tare_readings:
         return state
@@ -169,9 +169,9 @@ def _push(settings: Settings, state: ControlState, inp: TickInput, contact: tupl
     else:
         theta_p = open_loop.push_angle()
     if abs(theta_p) > BACKWARD_RAD:
-        # Beyond 90 degrees the law would pull: the direction stays as it was and safety counts the ticks (F56).
+        # Beyond 90 degrees the law would pull: the direction is kept and safety counts the ticks (F56).
         return replace(state, theta_f=theta_f, speed=speed, backward_ticks=state.backward_ticks + 1)
-    return replace(state, theta_f=theta_f, theta_p=theta_p, speed=speed, backward_ticks=0)  # no number: F58 at once
+    return replace(state, theta_f=theta_f, theta_p=theta_p, speed=speed, backward_ticks=0)  # not a number: F58 at once
 
 
 def _without_force(
@@ -236,7 +236,7 @@ def _retreat(settings: Settings, state: ControlState, inp: TickInput, contact: t
 
 
 def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
-    """Compare the mean of as many readings as the tare took, at rest again, with the tare."""
+    """Compare the tare with the mean of as many readings, taken at rest again."""
     if not _rested(state, inp.now_ns, REST_NS):
         return replace(state, speed=0.0, tare=TareSums())
     if state.tare.count < settings.tare_readings:
@@ -246,5 +246,5 @@ def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlSt
 
 
 def judge_tare(settings: Settings, state: ControlState) -> Judgement:
-    """Return what the readings summed up so far come to, by what the sensor declares of itself."""
+    """Return the tare of the readings summed so far, judged by the figures that the sensor declares."""
     return judge(state.tare, settings.sensor_noise, settings.sensor_range, settings.sensor_resolution)

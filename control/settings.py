@@ -1,4 +1,4 @@
-"""What control needs of a rig file, resolved once."""
+"""The settings that control takes from a rig file, resolved once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SETTLE_S = 0.2
 
 
 class Settings(msgspec.Struct, frozen=True, gc=False):
-    """Gains, path and constants of the rig; `in_contact` starts without approach, with a saved tare."""
+    """Gains, path and constants of the rig; `in_contact`: start in contact, without approach and with a saved tare."""
 
     control: ControlConfig
     sensor_noise: Vector6
@@ -32,15 +32,15 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     """Contact ball centre in the BODY frame, m."""
     expected_contact_m: float
     ramp_s: float
-    """Duration of the push's ramps, s: the rig's, or longer where its acceleration limit needs it."""
+    """Duration of the push's ramps, s: the rig's value, or longer where its acceleration limit requires it."""
     period_s: float
     """Period of the loop, s."""
     tare_readings: int
-    """How many readings a tare needs, at the rate that the sensor declares."""
+    """How many readings a tare needs, at the sensor's declared rate."""
     settle_readings: int
-    """How many readings the sensor must have given before anything begins."""
+    """How many readings the sensor must have sent before the run starts."""
     contact_readings: int
-    """How many readings in a row above the threshold are contact."""
+    """How many consecutive readings above the threshold count as contact."""
     in_contact: bool
 
     @classmethod

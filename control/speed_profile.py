@@ -1,11 +1,11 @@
-"""Speed along the way: a ramp up, a plateau, and a ramp down that ends on the wanted distance."""
+"""Speed along the path: a ramp up, a plateau, and a ramp down that ends at the wanted distance."""
 
 from __future__ import annotations
 
 import math
 
 CREEP_M_PER_S = 0.01
-"""The last millimetres are gone at this speed, so that the push never ends short of its distance."""
+"""The last millimetres are covered at this speed, so that the push never ends short of its distance."""
 
 
 def push_speed(elapsed_s: float, start_speed: float, speed: float, ramp_s: float, remaining_m: float) -> float:

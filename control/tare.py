@@ -1,8 +1,8 @@
 """Software tare of the force-torque sensor: the mean of samples at rest, or a reason why it cannot be trusted. Pure.
 
-The FT 300 has no zero command, and its bias of tens of newtons changes at every power cycle. The mean holds bias
+The FT 300 has no zero command, and its bias of tens of newtons changes at every power cycle. The mean contains bias
 and tool weight together, so it is valid only while the arm keeps its pose and the base stays level.
-The samples are folded into sums one by one as they come (`add`), then judged (`judge`).
+The samples are added to sums one by one as they arrive (`add`), then judged (`judge`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ NOISE_FACTOR = 2.0
 """Refuse a standard deviation above this many times the sensor's own noise."""
 DRIFT_STANDARD_ERRORS = 4.0
 DRIFT_FLOOR = (0.1, 0.1, 0.1, 0.005, 0.005, 0.005)
-"""Drift that is always allowed (N, N*m): no push would notice it. A sensor's own resolution where that is coarser."""
+"""Drift (N, N*m) that is always allowed, too small to affect a push; the sensor's resolution if that is coarser."""
 BIAS_SHARE = 0.5
 """A bias above this share of the range leaves too little of it for pushing."""
 SMALLEST_COUNT = 8
-"""Fewer samples do not make quarters."""
+"""Fewer samples cannot be split into quarters."""
 
 _ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -49,7 +49,7 @@ class Tare(msgspec.Struct, frozen=True, gc=False):
 
 
 class Judgement(msgspec.Struct, frozen=True, gc=False):
-    """A tare, and why it is refused: `what` is wrong and what to `do` ("" when it is not)."""
+    """A tare, and why it is refused: `what` is wrong and what to `do` (both "" when it is accepted)."""
 
     tare: Tare
     refusal: Refusal = Refusal.NONE
@@ -58,7 +58,7 @@ class Judgement(msgspec.Struct, frozen=True, gc=False):
 
 
 def add(sums: TareSums, values: Vector6, wanted: int) -> TareSums:
-    """Return the sums with one more sample, of `wanted` in all (which says where the quarters are)."""
+    """Return the sums with one more sample; `wanted` is the final number of samples, which determines the quarters."""
     n, quarter = sums.count, wanted // 4
     origin = sums.origin if n else values
     offset = _minus(values, origin)
@@ -79,9 +79,9 @@ def add(sums: TareSums, values: Vector6, wanted: int) -> TareSums:
 def judge(sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vector6) -> Judgement:
     """Return the tare of complete sums (at least SMALLEST_COUNT samples) and whether it can be trusted.
 
-    noise, sensor_range, resolution: the sensor's own, per axis (N, N*m); the noise is one standard deviation.
-    Refused: a reading that is not finite, one that moves (standard deviation above twice the noise, or a drift from
-    the first to the last quarter beyond 4 standard errors and a small floor), a bias that leaves less than half of
+    noise, sensor_range, resolution: the sensor's figures per axis (N, N*m); the noise is one standard deviation.
+    Refused: a reading that is not finite, one that is not steady (standard deviation above twice the noise, or a drift
+    from the first to the last quarter beyond 4 standard errors and a small floor), a bias that leaves less than half of
     the range.
     """
     n, quarter = sums.count, sums.count // 4
@@ -99,7 +99,7 @@ def judge(sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vec
             return Judgement(result, Refusal.UNSETTLED, what, wait)
         mean_first, sd_first = _mean_sd(sums.first[i], sums.first_squares[i], quarter)
         mean_last, sd_last = _mean_sd(sums.last[i], sums.last_squares[i], quarter)
-        # Noise within the quarters, because over all samples a drift would excuse itself.
+        # Noise is measured within the quarters: over all samples a drift would raise the noise and so hide itself.
         variance = (sd_first**2 + sd_last**2) / 2
         allowed = DRIFT_STANDARD_ERRORS * math.sqrt(2 * variance / quarter) + max(DRIFT_FLOOR[i], resolution[i])
         drift = mean_last - mean_first
@@ -117,7 +117,7 @@ def judge(sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vec
 def _mean_sd(total: float, squares: float, n: int) -> tuple[float, float]:
     mean = total / n
     variance = (squares - n * mean * mean) / (n - 1)
-    return mean, 0.0 if variance < 0.0 else math.sqrt(variance)  # rounding; NaN stays NaN
+    return mean, 0.0 if variance < 0.0 else math.sqrt(variance)  # negative by rounding; NaN stays NaN
 
 
 def _plus(a: Vector6, b: Vector6) -> Vector6:

@@ -1,4 +1,4 @@
-"""Bookkeeping of the loop's timing: a fixed histogram of lateness, so that a run of any length costs the same."""
+"""Statistics of the loop's timing: a fixed histogram of lateness, so that memory does not grow with the run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ BUCKETS = 5_000
 
 
 class LoopTiming:
-    """Counts ticks, skipped periods, and how late the ticks woke (ns)."""
+    """Counts ticks and skipped periods, and how late the ticks woke up (ns)."""
 
     def __init__(self) -> None:
         self.ticks = 0
@@ -26,7 +26,7 @@ class LoopTiming:
         self._late[min(late_ns // BUCKET_NS, BUCKETS - 1)] += 1
 
     def late_percentile_ms(self, percent: float) -> float:
-        """Return the lateness in ms below which `percent` of the ticks woke (0.0 without ticks)."""
+        """Return the lateness in ms below which `percent` of the ticks woke up (0.0 without ticks)."""
         wanted = self.ticks * percent / 100.0
         seen = 0
         for bucket, count in enumerate(self._late):

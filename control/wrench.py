@@ -1,4 +1,4 @@
-"""From the sensor's reading to the force on the slider in the WORLD frame.
+"""Converts the sensor's reading into the force on the slider in the WORLD frame.
 
 The sensor measures the *reaction on the tool*, with bias and tool weight. Taring removes both, as long as the
 arm stays where it is and the base stays level. So

@@ -1,4 +1,4 @@
-"""Is the arm held, and does it still say so? Any program that is not ours, any drift, any stop is a fault."""
+"""Checks that the arm is held: another program, drift, a stop or stale data is a fault."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from safety.finding import NS_PER_MS, Finding
 from safety.settings import SafetySettings
 
 STALE_HOLD_NS = 40_000_000
-"""Five packets of the controller; 25 ms were seen on a loaded loopback."""
+"""Five packets of the controller; up to 25 ms were measured on a loaded loopback."""
 STALE_STOP_NS = 100_000_000
 MAX_JOINT_SPEED_RAD_PER_S = 0.02
 JOINT_SPEED_PACKETS = 2
@@ -64,7 +64,7 @@ def _of_state(settings: SafetySettings, inp: TickInput) -> list[str]:
         return ["F22"]
     if state == ArmState.FOREIGN_PROGRAM:
         return ["F28"]
-    if state != ArmState.HOLDING:  # off, moved by hand, unknown, and a number that is no state at all
+    if state != ArmState.HOLDING:  # off, moved by hand, unknown, or a number that is not a valid state
         return ["F27"]
     if settings.servo and not inp.arm.servo:
         return ["F20-stop"]

@@ -1,4 +1,4 @@
-"""Does the base answer, stand where it says, and move as it was told?"""
+"""Checks that the base responds, that its pose is plausible, and that it moves as commanded."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ POSE_SLOW_FLOOR_NS, POSE_STOP_FLOOR_NS = 50_000_000, 120_000_000
 GATE_RECORD_STOP_NS = 100_000_000
 OVERSPEED_SAMPLES = 2
 IGNORE_SHARE = 0.5
-"""Of the commanded speed: half of 0.1 m/s is the 0.05 m/s of the fault table ..."""
+"""Share of the commanded speed: half of 0.1 m/s is the 0.05 m/s of the fault table ..."""
 IGNORE_LEAST_M_PER_S = 0.02
-"""... and no less than what odometry may be off at rest."""
+"""... and at least the error that odometry may have at rest."""
 IGNORE_NS = 300_000_000
 MOVING_M_PER_S = 0.03
 MOVING_NS = 100_000_000
 STOPPING_NS = 200_000_000
 BASE_DECELERATION = 2.5
-"""m/s^2, what the Ridgeback's own controller allows."""
+"""m/s^2, the limit in the Ridgeback's own controller."""
 JUMP_M, JUMP_RAD = 0.03, 0.05
 JUMPS = 3
 
@@ -44,9 +44,9 @@ def check(
 
 
 def trusted_pose(settings: SafetySettings, state: SafetyState, inp: TickInput) -> Pose2D:
-    """Return the pose that control may use: the newest, or the last good one while that is none (F42) or a jump (F41).
+    """Return the pose for control: the newest, or the last valid one while that is invalid (F42) or a jump (F41).
 
-    Before there was a good one it is the newest, whatever it is.
+    Before the first valid pose it is the newest, even if that is invalid.
     """
     if not state.pose_seq or (_usable(inp) and not _jumps(settings, state, inp)):
         return inp.base.pose
@@ -59,7 +59,7 @@ def _usable(inp: TickInput) -> bool:
 
 
 def _jumps(settings: SafetySettings, state: SafetyState, inp: TickInput) -> int:
-    """Return how many poses in a row, with this usable one, are further off than the base can have moved."""
+    """Return how many consecutive poses, including this one, are further away than the base can have moved."""
     base, pose = inp.base, inp.base.pose
     if base.pose_seq == state.pose_seq:
         return state.pose_jumps
@@ -82,7 +82,7 @@ def _of_link(inp: TickInput) -> list[str]:
         faults.append("F67")
     if inp.now_ns - base.published_ns > GATE_RECORD_STOP_NS:
         faults.append(Finding("F67-late", (inp.now_ns - base.published_ns) / NS_PER_MS))
-    # Odometry itself, not just anything: every judgement of motion below rests on it.
+    # Odometry itself, not just any message: all motion checks below depend on it.
     silent_ns = inp.now_ns - base.odometry_received_ns
     if silent_ns > STALE_STOP_NS:
         faults.append(Finding("F31-stop", silent_ns / NS_PER_MS))
@@ -107,7 +107,7 @@ def _of_pose(
         return state, [*faults, "F42"]
     if base.pose_seq != state.pose_seq:
         jumps = _jumps(settings, state, inp)
-        # A jump keeps the old reference, so that a pose that stays away is counted again and again.
+        # A jump keeps the old reference, so that a pose that stays away is counted each time.
         if jumps == 0:
             state = replace(state, pose_x=pose.x, pose_y=pose.y, pose_yaw=pose.yaw, pose_ns=base.pose_received_ns)
         state = replace(state, pose_seq=base.pose_seq, pose_jumps=jumps)
@@ -137,7 +137,7 @@ def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> 
         faults.append(Finding("F33", off))
     zero_ns = inp.now_ns - state.zero_since_ns if state.zero_since_ns else 0
     settled = zero_ns >= STOPPING_NS + settings.push_speed / BASE_DECELERATION * 1e9
-    fresh = inp.now_ns - base.odometry_received_ns <= STALE_HOLD_NS  # an old speed says nothing of now
+    fresh = inp.now_ns - base.odometry_received_ns <= STALE_HOLD_NS  # an old speed says nothing about the present
     moving = settled and fresh and speed > MOVING_M_PER_S and state.mode >= Mode.STOP
     moving_since = (state.moving_since_ns or inp.now_ns) if moving else 0
     if moving_since and inp.now_ns - moving_since >= MOVING_NS:

@@ -1,6 +1,6 @@
 """The last pure step before the gate: speed clamp, rate limit, and the reaction of the mode.
 
-The envelope never turns a velocity: clamps scale the whole vector, so that a push stays a push in its direction.
+The envelope never rotates a velocity: clamps scale the complete vector, so that the push keeps its direction.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from robot_io.messages import BodyTwist
 from robot_io.tick import EnvelopeState, Mode
 
 SLOW_FACTOR = 0.5
-"""In SLOW, at most half of what control wants."""
+"""In SLOW, half of the velocity that control wants."""
 
 
 OVERSPEED_FACTOR = 1.3
@@ -21,7 +21,7 @@ OVERSPEED_FACTOR = 1.3
 
 
 class EnvelopeLimits(msgspec.Struct, frozen=True, gc=False):
-    """What the envelope keeps to and the gate insists on: m/s, rad/s, m/s^2, rad/s^2, and the tick's period in ns."""
+    """Limits that the envelope applies and the gate enforces: m/s, rad/s, m/s^2, rad/s^2; the tick's period in ns."""
 
     speed: float
     turn_rate: float
@@ -31,7 +31,7 @@ class EnvelopeLimits(msgspec.Struct, frozen=True, gc=False):
 
 
 def too_fast(limits: EnvelopeLimits, measured: BodyTwist) -> bool:
-    """Return whether a measured velocity (BODY frame) is beyond the limits and their margin; NaN is."""
+    """Return whether a measured velocity (BODY frame) is beyond the limits and their margin; True for NaN."""
     return not (
         math.hypot(measured.vx, measured.vy) <= OVERSPEED_FACTOR * limits.speed
         and abs(measured.omega) <= OVERSPEED_FACTOR * limits.turn_rate

@@ -1,4 +1,4 @@
-"""The fault table, as data: what can go wrong, how strongly the run reacts, and what clears it.
+"""The fault table, as data: what can go wrong, how the run reacts, and what clears it.
 
 The reaction is a `Mode`; the strongest active fault decides. Bounds are in ticks of 10 ms, from the first
 tick at which the fault can be seen to the first reduced or zero command that leaves the envelope.
@@ -15,16 +15,16 @@ from safety.settings import SafetySettings
 
 
 class Clears(StrEnum):
-    """What ends a fault."""
+    """How a fault clears."""
 
     AUTO = "auto"
     """By itself, after one clean second."""
     LATCHED = "latched"
-    """Only the end of the run."""
+    """Only at the end of the run."""
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """One row: id, what a person reads, the reaction, what clears it, and the bound in ticks."""
+    """One row: id, text for people, reaction, how it clears, bound in ticks, and exit code."""
 
     id: str
     text: str
@@ -55,7 +55,7 @@ def _row(
 
 _A, _L = Clears.AUTO, Clears.LATCHED
 _WARN = Mode.SILENT
-"""A reaction of SILENT asks for nothing: the fault is only counted and logged."""
+"""A reaction of SILENT has no effect on the run: the fault is only counted and logged."""
 
 FAULTS: dict[str, Fault] = dict(
     (
@@ -380,5 +380,5 @@ def limit_of(fault: Fault, settings: SafetySettings) -> float | None:
 
 
 def strongest(ids: tuple[str, ...]) -> Mode:
-    """Return the strongest reaction among active faults, SILENT (nothing) when there is none."""
+    """Return the strongest reaction among active faults, SILENT (no reaction) when there is none."""
     return max((FAULTS[i].mode for i in ids), default=Mode.SILENT)

@@ -1,8 +1,8 @@
 """The gate's judgement, pure: which command may reach the base, and when zero is sent instead.
 
-The gate is the last line. It forwards a command only when it is fresh, finite, in sequence and inside the
-envelope; on silence, EOF or nonsense it sends zero and latches, and nothing but a restart unlatches it. It
-knows nothing of forces or paths, so that nothing up there can be wrong in a way that matters down here.
+The gate is the last line of defence. It forwards a command only when it is fresh, finite, in sequence and inside the
+envelope; on silence, EOF or nonsense it sends zero and latches, and only a restart unlatches it. It
+knows nothing of forces or paths, so that no error in control can affect its decisions.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from safety.envelope import EnvelopeLimits, too_fast
 ZERO = BodyTwist()
 
 FRAME_MAX_AGE_NS = 50_000_000
-"""Silence of control for five ticks latches the gate, and so does a frame that is older when it is read."""
+"""Five ticks of silence from control latch the gate, and so does a frame that is older than this when it is read."""
 OWN_PAUSE_NS = 100_000_000
-"""A gate that did not run for longer than this latches when it runs again; control has stopped by then."""
+"""A gate process that was paused for longer than this latches when it resumes; control has stopped by then."""
 STEP_MARGIN = 1.2
 """A step of the command may exceed the acceleration limit by this much (rounding, lateness)."""
 REPEAT_NS = 18_000_000
-"""Unchanged or growing commands leave every 20 ms (less the jitter of a tick); reduced and zero ones leave at once."""
+"""Unchanged or growing commands are sent every 20 ms (less the jitter of a tick); reduced and zero ones at once."""
 OVERSPEED_SAMPLES = 3
 
 
@@ -74,11 +74,11 @@ LATCH_FAULT = {
     Latch.LINK: "F30",
     Latch.PAUSED: "F67",
 }
-"""The row of the fault table that a latch stands for; any other is F36, a command that may not pass."""
+"""The row of the fault table for each latch; any other latch is F36, a command that was refused."""
 
 
 class GateState(msgspec.Struct, frozen=True, gc=False):
-    """What the gate remembers: the last frame, what was sent last and when, and why it latched."""
+    """The gate's state: the last frame, the last command sent and when, and why it latched."""
 
     latch: Latch = Latch.NONE
     seq: int = 0
@@ -93,7 +93,7 @@ class GateState(msgspec.Struct, frozen=True, gc=False):
 
 
 def on_frame(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> GateState:
-    """Judge one frame (None: nonsense) read at `now_ns`; a bad one latches."""
+    """Judge one frame (None: unreadable) read at `now_ns`; a bad one latches."""
     if state.latch:
         return state
     latch = _judge(limits, state, frame, now_ns)
@@ -105,7 +105,7 @@ def on_frame(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, 
 def on_frames(limits: EnvelopeLimits, state: GateState, frames: Sequence[GateFrame | None], now_ns: int) -> GateState:
     """Judge all frames that were waiting, oldest first; only the newest must be fresh.
 
-    When the gate itself was held up for a moment, control's older frames waited: that is not their fault.
+    While the gate itself was delayed, control's older frames waited: their age does not count against them.
     """
     for frame in frames[:-1]:
         state = on_frame(limits, state, frame, now_ns if frame is None else min(frame.sent_ns, now_ns))
@@ -113,7 +113,7 @@ def on_frames(limits: EnvelopeLimits, state: GateState, frames: Sequence[GateFra
 
 
 def on_own_pause(state: GateState, pause_ns: int) -> GateState:
-    """Latch when the gate itself did not run for too long: what happened meanwhile it cannot know."""
+    """Latch when the gate itself was paused for too long: it cannot know what happened meanwhile."""
     return latched(state, Latch.PAUSED) if pause_ns > OWN_PAUSE_NS else state
 
 
@@ -132,12 +132,12 @@ def on_speed(limits: EnvelopeLimits, state: GateState, twist: BodyTwist) -> Gate
 
 
 def on_eof(state: GateState) -> GateState:
-    """Latch because control's end of the socket is closed: the normal end, or its death in the middle of a push."""
+    """Latch because control closed its end of the socket: the normal end, or a crash in the middle of a push."""
     return latched(state, Latch.EOF if state.twist == ZERO else Latch.EOF_MOVING)
 
 
 def latched(state: GateState, cause: Latch) -> GateState:
-    """Return the state latched for `cause`; the first cause stays."""
+    """Return the state latched for `cause`; the first cause is kept."""
     return msgspec.structs.replace(state, latch=state.latch or cause, twist=ZERO)
 
 
@@ -152,7 +152,7 @@ def due(state: GateState, now_ns: int) -> BodyTwist | None:
 
 
 def sent(state: GateState, twist: BodyTwist, now_ns: int) -> GateState:
-    """Note what really went out."""
+    """Record the command that was actually sent."""
     return msgspec.structs.replace(state, sent=twist, sent_ns=now_ns)
 
 
@@ -174,7 +174,7 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
         return Latch.ENVELOPE
     if not _reduces(twist, state.twist):
         ticks = frame.tick - state.tick if state.tick >= 0 else 1
-        # More ticks than fit into the longest silence allowed are no excuse for a jump.
+        # More ticks than fit into the longest allowed silence do not justify a larger jump.
         time_s = min(ticks * limits.period_ns, FRAME_MAX_AGE_NS + limits.period_ns) * 1e-9
         step = math.hypot(twist.vx - state.twist.vx, twist.vy - state.twist.vy)
         turn_step = abs(twist.omega - state.twist.omega)
@@ -187,7 +187,7 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
 
 
 def _reduces(new: BodyTwist, old: BodyTwist) -> bool:
-    """Return whether every component moves towards zero (or stays)."""
+    """Return whether every component moves towards zero or stays the same."""
     return all(
         abs(b) <= abs(a) and a * b >= 0.0 for a, b in ((old.vx, new.vx), (old.vy, new.vy), (old.omega, new.omega))
     )

@@ -2,9 +2,9 @@
 
     python -m safety.gate_process   (job as one JSON object on stdin)
 
-Frames of control come in over a SEQPACKET socket, velocities go out over the bridge, everything the base says
+Control's frames arrive on a SEQPACKET socket, velocities go out over the bridge; everything received from the base
 is stamped, published to control through a shared record, and pushed into the gate's own log ring. When control
-is gone it sends zero for at most half a second and ends, whatever it latched before.
+is gone, the gate sends zero for at most half a second and ends, whatever it latched before.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ CLOCK_NS = 2 * NS_PER_MS
 
 
 class GateJob(msgspec.Struct, frozen=True):
-    """What the launcher hands over: settings, and descriptors that this process inherits."""
+    """The launcher's job for the gate: settings, and descriptors that this process inherits."""
 
     base: BaseConfig
     frames: FramesConfig
     kind_folder: str
-    """Where else the module of the base's kind may be."""
+    """Further folders in which to look for the module of the base's kind."""
     limits: EnvelopeLimits
     control_fd: int
     record_fd: int
@@ -54,7 +54,7 @@ class GateJob(msgspec.Struct, frozen=True):
 
 
 class GateProcess:
-    """Sockets, timers, driver and log ring around a `GateShell`, which decides."""
+    """Sockets, timers, driver and log ring around a `GateShell`, which makes all decisions."""
 
     def __init__(self, job: GateJob, base: Base, status: StatusPipe) -> None:
         self._base = base
@@ -67,12 +67,12 @@ class GateProcess:
         self._loop = EventLoop()
 
     def run(self) -> None:
-        """Serve until control is gone and the base was told zero."""
+        """Run until control is gone and zero has been sent to the base."""
         self._base.before_close = self._loop.remove_fd
         self._loop.add_fd(self._control.fileno(), self._on_control)
         self._loop.add_fd(self._base.fileno(), self._on_base)
         self._loop.call_every(CLOCK_NS, self._on_clock)
-        self._take()  # what came while it started: control's first record already holds a pose
+        self._drain_base()  # what arrived during start-up: control's first record then already holds a pose
         self._publish()
         self._shell = replace(self._shell, ran_ns=monotonic_ns())
         try:
@@ -85,25 +85,25 @@ class GateProcess:
 
     def _on_control(self, _events: int) -> None:
         self._read_control()
-        self._let_out()
+        self._send_due()
 
     def _on_base(self, _events: int) -> None:
-        self._take()
-        self._let_out()
+        self._drain_base()
+        self._send_due()
 
     def _on_clock(self, _deadline_ns: int) -> None:
         now_ns = monotonic_ns()
         self._read_control()
-        self._take()
+        self._drain_base()
         self._shell = self._shell.on_clock(now_ns, self._base.health())
-        self._let_out()
+        self._send_due()
         if self._shell.publish_due(now_ns):
             self._publish()
         if self._shell.ends(now_ns, self._base.health().state):
             self._loop.stop()
 
     def _read_control(self) -> None:
-        """Take every frame that waits: they are read before any silence is judged."""
+        """Read every waiting frame, before silence is judged."""
         began_ns = monotonic_ns()
         frames: list[GateFrame | None] = []
         gone = bool(self._shell.zeros_since_ns)
@@ -122,9 +122,9 @@ class GateProcess:
             self._loop.remove_fd(self._control.fileno())
             self._shell = self._shell.on_control_gone(monotonic_ns())
 
-    def _take(self) -> None:
+    def _drain_base(self) -> None:
         samples, now_ns = self._base.drain(), monotonic_ns()
-        if any(sample.received_ns > now_ns for sample in samples):  # it would never grow old
+        if any(sample.received_ns > now_ns for sample in samples):  # it would never become stale
             samples = tuple(replace(sample, received_ns=min(sample.received_ns, now_ns)) for sample in samples)
         for sample in samples:
             self._log.inbound(sample)
@@ -132,7 +132,7 @@ class GateProcess:
             self._shell = self._shell.on_samples(samples)
             self._publish()
 
-    def _let_out(self) -> None:
+    def _send_due(self) -> None:
         now_ns = monotonic_ns()
         self._shell, latching = self._shell.on_leaving(now_ns)
         if latching is not None:
@@ -144,7 +144,7 @@ class GateProcess:
             return
         left_ns = self._base.sent_ns
         really = self._base.command(wanted)
-        if self._base.sent_ns == left_ns:  # over a lost link nothing leaves
+        if self._base.sent_ns == left_ns:  # nothing is sent over a lost link
             self._shell = self._shell.on_sent(wanted, None, now_ns)
         else:
             self._shell = self._shell.on_sent(wanted, really, now_ns)
@@ -160,7 +160,7 @@ class GateProcess:
 
 
 def main() -> int:
-    """Run the gate; the exit code is that of the error when the base could not be opened."""
+    """Run the gate; return 0, or the error's exit code when the base could not be opened."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # only control's EOF ends the gate
     set_timer_slack_1ns()
@@ -180,7 +180,7 @@ def main() -> int:
             folder=job.kind_folder,
         )
         info = started(base, "base", job.base.kind)
-    except PushError as error:  # the process ends, and with it whatever was open
+    except PushError as error:  # the process ends, which closes everything that was open
         status.error(error)
         return error.exit_code
     process = GateProcess(job, base, status)

@@ -1,13 +1,13 @@
-"""The gate around its judgement, pure: what it takes in, sends, publishes and logs, and when it ends.
+"""The gate's logic around `safety.gate`, pure: what it accepts, sends, publishes and logs, and when it ends.
 
-The gate's process and level sim both keep one `GateShell`, hand it what arrived and what the clock says, and carry
-out what it answers; neither decides anything itself. In the order of one turn:
+The gate's process and level sim each hold one `GateShell`, pass it what arrived and the time, and do what it
+returns; neither decides anything itself. The order of calls in one turn:
 
     shell = shell.on_frames(frames, began_ns, now_ns)  # control's frames, before any silence is judged
     shell = shell.on_samples(base.drain())
     shell = shell.on_clock(now_ns, base.health())
     shell, latching = shell.on_leaving(now_ns)         # log and publish `latching` unless None
-    wanted = shell.due(now_ns)                         # send it unless None, then tell `on_sent`
+    wanted = shell.due(now_ns)                         # send it unless None, then call `on_sent`
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ from safety.envelope import EnvelopeLimits
 from safety.gate import GateState, Latch
 
 PUBLISH_NS = 10_000_000
-"""A record leaves at least this often, and whenever something changes."""
+"""A record is published at least this often, and whenever something changes."""
 LAST_ZEROS_NS = 500_000_000
-"""How long zeros go on after control's end, at most."""
+"""How long zeros are sent after control has ended, at most."""
 FIRST_EFFECT_NS = 120_000_000
-"""Odometry that arrived earlier than this after the last zeros began may be from before they took effect."""
+"""Odometry that arrives within this time after the final zeros began may have been measured before they took effect."""
 REST_M_PER_S = REST_RAD_PER_S = 0.005
 
 
 class Latching(msgspec.Struct, frozen=True, gc=False):
-    """A latch to be logged: the last good frame's sequence number and tick, the cause, and its words."""
+    """A latch to be logged: the last good frame's sequence number and tick, the cause, and its text."""
 
     seq: int
     tick: int
@@ -55,24 +55,24 @@ class Latching(msgspec.Struct, frozen=True, gc=False):
 
 
 class GateShell(msgspec.Struct, frozen=True, gc=False):
-    """All that the gate remembers. Every method returns the shell that follows; times are CLOCK_MONOTONIC ns."""
+    """The gate's complete state. Every method returns the next shell; times are CLOCK_MONOTONIC ns."""
 
     limits: EnvelopeLimits
     ran_ns: int
-    """When something last could leave: a longer pause than the gate may make itself is seen by it."""
+    """When the gate could last send; used to detect a pause of the gate that is too long."""
     gate: GateState = GateState()
     record: BaseRecord = BaseRecord()
-    """What control sees of base and gate."""
+    """The record of base and gate that control reads."""
     told: Latch = Latch.NONE
     """The latch that has been logged."""
     link_cause: str = ""
     zeros_since_ns: int = 0
-    """When control was gone; 0 while it is there."""
+    """When control ended; 0 while it is running."""
 
     def on_frames(self, frames: Sequence[GateFrame | None], began_ns: int, read_ns: int) -> GateShell:
-        """Judge the frames that waited (None: nonsense), oldest first, read from `began_ns` to `read_ns`.
+        """Judge the waiting frames (None: unreadable), oldest first, read from `began_ns` to `read_ns`.
 
-        A pause of the gate in between makes no frame old, and is not silence of control.
+        A pause of the gate in between does not age a frame and does not count as silence of control.
         """
         if not frames:
             return self
@@ -83,11 +83,11 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         return replace(self, gate=state, record=record)
 
     def on_control_gone(self, now_ns: int) -> GateShell:
-        """Latch because control's end of the socket is closed; the last zeros begin."""
+        """Latch because control closed its end of the socket, and begin the final zeros."""
         return replace(self, gate=gate.on_eof(self.gate), zeros_since_ns=now_ns)
 
     def on_samples(self, samples: Sequence[Stamped[BaseFeed]]) -> GateShell:
-        """Take what the base said, oldest first; three measured speeds in a row beyond the limits latch."""
+        """Process samples from the base, oldest first; three consecutive measured speeds beyond the limits latch."""
         state, changes = self.gate, dict[str, Any]()
         pose_seq, odometry_seq = self.record.pose_seq, self.record.odometry_seq
         for sample in samples:
@@ -101,7 +101,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
                 state = gate.on_speed(self.limits, state, value.twist)
             elif isinstance(value, BaseReport):
                 changes.update(status=value.status, status_received_ns=at_ns)
-            # The object's pose is logged and goes no further; the echo of our own commands is for the driver.
+            # The object's pose is only logged; the echo of our own commands is for the driver.
         if not changes:
             return self
         record = replace(self.record, pose_seq=pose_seq, odometry_seq=odometry_seq, **changes)
@@ -115,9 +115,9 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         return replace(self, gate=gate.latched(state, Latch.LINK), link_cause=health.cause)
 
     def on_leaving(self, now_ns: int) -> tuple[GateShell, Latching | None]:
-        """Judge the gate's own pause, and return the latch that is to be logged now, if there is a new one.
+        """Judge the gate's own pause, and return the latch to be logged now, if there is a new one.
 
-        It stands where all ways out meet: whatever woke a frozen gate first, nothing leaves before this is judged.
+        Called before anything is sent, whatever woke the gate: after a freeze, nothing leaves before this is judged.
         """
         state = gate.on_own_pause(self.gate, now_ns - self.ran_ns)
         latch = state.latch
@@ -134,12 +134,12 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         return gate.due(self.gate, now_ns)
 
     def on_sent(self, wanted: BodyTwist, really: BodyTwist | None, now_ns: int) -> GateShell:
-        """Note what was wanted and what really left (None: nothing, over a lost link)."""
+        """Record the wanted command and the one actually sent (None: nothing, because the link is lost)."""
         record = self.record if really is None else replace(self.record, sent=really, sent_ns=now_ns)
         return replace(self, gate=gate.sent(self.gate, wanted, now_ns), record=record)
 
     def publish_due(self, now_ns: int) -> bool:
-        """Return whether a record must leave although nothing has changed."""
+        """Return whether a record must be published although nothing has changed."""
         return now_ns - self.record.published_ns >= PUBLISH_NS
 
     def on_publish(self, now_ns: int, *, newest_inbound_ns: int, newest_pong_ns: int) -> GateShell:
@@ -156,7 +156,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         return replace(self, record=record)
 
     def ends(self, now_ns: int, link: LinkState) -> bool:
-        """Return whether control is gone and the base was told zero: for long enough, until it rests, or in vain."""
+        """Return whether control is gone and zeros were sent long enough, the base rests, or the link is lost."""
         if not self.zeros_since_ns:
             return False
         return now_ns >= self.zeros_since_ns + LAST_ZEROS_NS or link == LinkState.LOST or self._at_rest()

@@ -1,4 +1,4 @@
-"""Is this machine keeping up, are the other processes alive, and what does the operator want?"""
+"""Checks that this machine keeps up, that the other processes are alive, and what the operator requested."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hard ceilings of the program, each with its unit and reason; a rig file may only go below them."""
+"""Hard ceilings of the program, each with its unit and reason; a rig file may only set lower values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robot_io.rig.config import RigConfig
 
 
 class Ceiling(msgspec.Struct, frozen=True):
-    """One ceiling: the rig key it bounds, the value in the key's unit, and why."""
+    """One ceiling: the rig key it bounds, the value in the key's unit, and the reason."""
 
     key: str
     value: float
@@ -22,25 +22,25 @@ CEILINGS = (
     Ceiling("limits.max_force_N", 150.0, "the authors of the paper stop at 150 N"),
     Ceiling("limits.slow_force_N", 100.0, "slow down well before the stop at 150 N"),
     Ceiling("limits.max_torque_Nm", 20.0, "two thirds of the range of the authors' sensor"),
-    Ceiling("limits.max_acceleration_m_per_s2", 2.5, "what the Ridgeback's own controller allows"),
-    Ceiling("limits.max_yaw_acceleration_rad_per_s2", 1.0, "what the Ridgeback's own controller allows"),
+    Ceiling("limits.max_acceleration_m_per_s2", 2.5, "the limit in the Ridgeback's own controller"),
+    Ceiling("limits.max_yaw_acceleration_rad_per_s2", 1.0, "the limit in the Ridgeback's own controller"),
     Ceiling("limits.max_heading_error_deg", 20.0, "the force is rotated by the heading"),
     Ceiling("limits.drift_hold_rad", 0.01, "0.01 rad at 1 m reach is 1 cm at the contact"),
     Ceiling("limits.drift_stop_rad", 0.02, "the arm's own limit at rest is 0.05 rad"),
 )
 
 MAX_SPEED_M_PER_S = 0.75
-"""No rig may command more: 1.5 times the fastest allowed push speed of 0.5 m/s."""
+"""No rig may command a higher speed: 1.5 times the fastest allowed push speed of 0.5 m/s."""
 MAX_TURN_RATE_RAD_PER_S = 0.25
 """The authors' limit on the base's turn rate."""
 RANGE_SHARE = 0.9
 """A limit on force or torque above this share of the sensor's range could never be measured."""
 SENSOR_RATE_HZ = (50.0, 8000.0)
-"""A slower sensor is stale between two readings; a faster one is not read in time."""
+"""A slower sensor would be stale between two readings; a faster one could not be read in time."""
 
 
 def check(rig: RigConfig) -> None:
-    """Raise ConfigError where `rig` goes above a ceiling or contradicts itself."""
+    """Raise ConfigError where `rig` exceeds a ceiling or contradicts itself."""
     problems = []
     for ceiling in CEILINGS:
         table, key = ceiling.key.split(".")
@@ -65,7 +65,7 @@ def check(rig: RigConfig) -> None:
 
 
 def _of_sensor(rig: RigConfig) -> list[str]:
-    """Return what is wrong with the facts that the sensor's kind declares, or with limits beyond its range."""
+    """Return the problems with the facts that the sensor's kind declares, or with limits beyond its range."""
     facts = rig.ft.declared
     numbers = (*facts.range, facts.rate_hz, *facts.resolution, *facts.noise)
     if not all(math.isfinite(value) and value > 0.0 for value in numbers):
@@ -73,7 +73,7 @@ def _of_sensor(rig: RigConfig) -> list[str]:
     problems = []
     low, high = SENSOR_RATE_HZ
     if not low <= facts.rate_hz <= high:
-        problems.append(f"ft.kind {rig.ft.kind!r} declares {facts.rate_hz:g} Hz; {low:g} to {high:g} Hz can be used")
+        problems.append(f"ft.kind {rig.ft.kind!r} declares {facts.rate_hz:g} Hz; supported: {low:g} to {high:g} Hz")
     for key, value, unit, axes in (
         ("limits.max_force_N", rig.limits.max_force_N, "N", facts.range[:3]),
         ("limits.max_torque_Nm", rig.limits.max_torque_Nm, "N*m", facts.range[3:]),

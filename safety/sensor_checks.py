@@ -1,4 +1,4 @@
-"""Is the force-torque sensor alive, sane and inside its limits? On raw packets, before any filter."""
+"""Checks that the force-torque sensor is alive, plausible and inside its limits, on raw packets before any filter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STALE_STOP_NS = 160_000_000
 
 
 def note(state: SafetyState, inp: TickInput) -> SafetyState:
-    """Remember when the newest packet came, before anything is judged by it."""
+    """Record when the newest packet arrived, without judging anything yet."""
     return replace(state, last_ft_ns=inp.ft.readings[-1].received_ns) if inp.ft.readings else state
 
 

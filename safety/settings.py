@@ -1,4 +1,4 @@
-"""What safety needs of a rig file, resolved once."""
+"""The settings that safety takes from a rig file, resolved once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
 SATURATED = 0.95
 """Share of the sensor's range."""
 FROZEN_S = 0.3
-"""Readings that stay equal for this long, by the rate that the sensor declares, are a fault."""
+"""Readings that stay equal for this long, at the sensor's declared rate, are a fault."""
 
 
 class SafetySettings(msgspec.Struct, frozen=True, gc=False):
@@ -25,13 +25,13 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     slow_force: float
     max_torque: float
     saturated: Vector6
-    """Readings from which on an axis is taken for saturated: N, N*m."""
+    """Readings at or above which an axis counts as saturated: N, N*m."""
     frozen_readings: int
-    """This many equal readings in a row are a fault."""
+    """This many consecutive equal readings are a fault."""
     noise_floor: bool
-    """The sensor's readings scatter, so that equal ones are a fault."""
+    """Whether the sensor's readings are noisy enough that equal ones are a fault."""
     held_pose: Joints
-    """Where the arm must be, rad: the frames of the rig are those of this pose."""
+    """Where the arm must be, rad: the frames of the rig are given for this pose."""
     held_pose_tolerance: float
     drift_hold: float
     drift_stop: float
@@ -74,10 +74,10 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
 
 
 def _scatters(ft: FtConfig) -> bool:
-    """Return whether 30 equal readings in a row cannot be chance.
+    """Return whether 30 consecutive equal readings cannot be chance.
 
-    They cannot where the noise of an axis is a step of its resolution or more: the likeliest count then holds 0.38 of
-    the readings, and 0.38^30 is 3e-13. With half a step it is 1e-5, a false stop in an hour.
+    They cannot where the noise of an axis is at least one step of its resolution: then at most 0.38 of the readings
+    have the most frequent value, and 0.38^30 is 3e-13. With half a step it is 1e-5, a false stop every hour.
     """
     axes = zip(ft.noise, ft.declared.resolution, strict=True)
     return ft.noise_force_N != 0.0 and any(noise >= step for noise, step in axes)

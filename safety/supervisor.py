@@ -1,4 +1,4 @@
-"""Faults to mode, mode to ending: pure, one place, the strongest reaction wins.
+"""Derives the mode from the active faults, and the end of the run from the mode. Pure; the strongest reaction wins.
 
 Escalation is immediate. De-escalation is one mode a tick, after one clean second, and only where the fault's
 row says that it clears by itself. STOP and DEAD are latched: they end the run.
@@ -20,16 +20,16 @@ from safety.settings import SafetySettings
 
 CLEAN_NS = 1_000_000_000
 REST_AT_MOST_NS = 1_500_000_000
-"""After a stop the run ends when the base is at rest, or after this long, whatever is measured: the measurement itself
-may be what failed."""
+"""After a stop the run ends when the base is at rest, or after this time at the latest: the measurement itself may have
+failed."""
 HELD_NS = 2_000_000_000
 """A HOLD that cannot clear by itself ends the run after this long at zero."""
 STALENESS = ("F01", "F24", "F25", "F31", "F40", "F67-late")
-"""Faults of age: right after a pause of this host they say more about the host than about the device."""
+"""Faults of stale data: right after a pause of this host they say more about the host than about the device."""
 
 
 class Verdict(msgspec.Struct, frozen=True, gc=False):
-    """What the supervisor says of a tick."""
+    """The supervisor's decision on one tick."""
 
     mode: Mode
     faults: tuple[str, ...]
@@ -50,7 +50,7 @@ def supervise(
     """Return the state and the verdict after all checks of this tick.
 
     control: control's state after this tick. wanted: what it wants, BODY frame. clamped: whether the envelope
-    had to clamp the tick before.
+    had to clamp in the previous tick.
     """
     state, faults = _gather(settings, state, inp, control, wanted, clamped)
     faults = _after_pause(state, inp, faults)
@@ -68,7 +68,7 @@ def supervise(
 
 
 def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
-    """Return the verdict on a tick whose checks themselves failed (an exception in the loop): over, at once."""
+    """Return the verdict on a tick whose checks failed with an exception (F68): the run ends at once."""
     latched = tuple(dict.fromkeys([*state.latched, "F68"]))
     mode = max(Mode(state.mode), FAULTS["F68"].mode)
     state = replace(state, mode=int(mode), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
@@ -92,7 +92,7 @@ def _note_first(state: SafetyState, faults: list[str], now_ns: int) -> SafetySta
 
 
 def note_command(state: SafetyState, command: BodyTwist, now_ns: int) -> SafetyState:
-    """Remember since when the command is zero."""
+    """Record since when the command has been zero."""
     zero = command == BodyTwist()
     since = (state.zero_since_ns or now_ns) if zero else 0
     return state if since == state.zero_since_ns else replace(state, zero_since_ns=since)
@@ -112,7 +112,7 @@ def _gather(
     faults += task_checks.check(inp, control, wanted, state.first_ns)
     if clamped:
         faults.append("F36")
-    if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has not spoken is no fault
+    if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has sent no data is not a fault
         return sensor_checks.note(state, inp), faults
     for check in (sensor_checks.check, arm_checks.check, base_checks.check):
         state, found = check(settings, state, inp, control)
@@ -121,12 +121,12 @@ def _gather(
 
 
 def _pause(state: SafetyState, inp: TickInput) -> bool:
-    """Return whether ticks were skipped just now; a loop that skips tick after tick has no pause to excuse it."""
+    """Return whether ticks were skipped just now; a loop that keeps skipping ticks does not count as a pause."""
     return inp.host.skipped > 0 and state.late_run == 1
 
 
 def _after_pause(state: SafetyState, inp: TickInput, faults: list[str]) -> list[str]:
-    """After a pause: no staleness in this tick, and at most HOLD in the next."""
+    """Return the faults that count: after a pause no stale data in this tick, and at most HOLD in the next."""
     if _pause(state, inp):
         return [i for i in faults if not i.startswith(STALENESS)]
     if state.grace_ticks:
@@ -168,11 +168,11 @@ def _working_mode(control: ControlState) -> Mode:
 def _ending(state: SafetyState, inp: TickInput, control: ControlState) -> tuple[bool, int]:
     """Return whether the run is over, and its exit code."""
     if state.mode >= Mode.STOP:
-        # The strongest cause names the end, the first of equals: a stop key is no clean end when the base rolled on.
+        # The strongest cause (first of equals) sets the exit code: a stop key is no clean end if the base kept moving.
         code = FAULTS[max(state.latched, key=lambda i: FAULTS[i].mode)].exit_code
         zero_ns = inp.now_ns - state.stop_since_ns
         twist = inp.base.odometry
-        # An unknown (NaN) speed compares false: it is not taken for rest.
+        # An unknown (NaN) speed compares false, so it does not count as rest.
         rest = abs(twist.vx) < REST_M_PER_S and abs(twist.vy) < REST_M_PER_S
         return (rest and zero_ns >= REST_NS) or zero_ns >= REST_AT_MOST_NS, code
     held = [i for i in state.latched if FAULTS[i].mode == Mode.HOLD]

@@ -1,4 +1,4 @@
-"""Does the push itself make sense: start, rest, contact, direction, numbers?"""
+"""Checks the push itself: start, rest, contact, direction, finite numbers."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from robot_io.tick import ControlState, Phase, TickInput
 from safety.finding import NS_PER_MS, Finding
 
 START_NS = 5_000_000_000
-RESTLESS_NS = 5_000_000_000
-"""A base that was told to stand is at rest within one; a motion still read then is none, or not ours."""
-STANDING = (Phase.REST, Phase.CHECK, Phase.LOST_HOLD)
+REST_TIMEOUT_NS = 5_000_000_000
+"""A stopped base comes to rest within 1 s; motion still measured after this is false or not caused by us."""
+AT_REST_PHASES = (Phase.REST, Phase.CHECK, Phase.LOST_HOLD)
 BACKWARD_TICKS = 20
 RESIDUAL_N = 5.0
-"""The product sheet's own threshold for a force that means something."""
+"""The smallest meaningful force according to the sensor's product sheet."""
 
 _REFUSALS = {1: "R02", 2: "R03"}
 
@@ -27,10 +27,10 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
         faults.append(Finding("R01", (inp.now_ns - first_ns) / NS_PER_MS))
     if phase == Phase.TARE and control.refusal:
         faults.append(_REFUSALS[control.refusal])
-    if not control.rest_since_ns and inp.now_ns - control.phase_since_ns > RESTLESS_NS:
+    if not control.rest_since_ns and inp.now_ns - control.phase_since_ns > REST_TIMEOUT_NS:
         if phase == Phase.TARE:
             faults.append("R05")
-        elif phase in STANDING:
+        elif phase in AT_REST_PHASES:
             faults.append("F39")
     if phase == Phase.LOST:
         faults.append("F52")

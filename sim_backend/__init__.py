@@ -1,1 +1,1 @@
-"""The slider model, the simulated world, and the emulators that speak the devices' real bytes."""
+"""The slider model, the simulated world, and the emulators that use the devices' real wire protocols."""

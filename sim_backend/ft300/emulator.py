@@ -1,8 +1,8 @@
-"""An FT 300 on a pty, byte for byte: Modbus slave, data stream, line speed, USB latency timer, and its bad days.
+"""An FT 300 on a pty, byte for byte: Modbus slave, data stream, line speed, USB latency timer, and faults.
 
 Runs inside an `EventLoop`: one thread, nothing blocks. Samples are taken on the sensor's own clock (rate error
-and phase) and asked of an `FtSource`. Where Robotiq's documents are silent, a knob (`Ft300Knobs`)
-says what is assumed.
+and phase) from an `FtSource`. Where Robotiq's documentation says nothing, a knob (`Ft300Knobs`)
+holds the assumption.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sim_backend.world.plant import FtSource
 
 RX_STEP_NS = 2 * NS_PER_MS
 REQUEST_PAUSE_NS = 10 * NS_PER_MS
-"""A request begun and not continued for this long is forgotten."""
+"""An incomplete request is discarded after this long without a byte."""
 TOO_LATE_NS = 50 * NS_PER_MS
 """After a pause of the host longer than this, missed samples are skipped, not sent in a burst."""
 
@@ -30,7 +30,7 @@ class Ft300Emulator:
     """An FT 300 at `port`, fed by `source`.
 
     rate_hz, phase: samples at (k + phase) / rate_hz of the monotonic clock. latency_ms: 0, 1 or 16. streaming:
-    found streaming, as after a client that crashed. link: a stable name for the pty. `knobs` may be replaced
+    starts in stream mode, as after a client crash. link: a stable name for the pty. `knobs` may be replaced
     while it runs (`paced` excepted).
     """
 
@@ -83,7 +83,7 @@ class Ft300Emulator:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened so far, by name."""
+        """Event counts so far, by name."""
         return {**self._counted, "attaches": self._port.attaches, "junk_bytes": self._scanner.junk_bytes}
 
     @property
@@ -92,7 +92,7 @@ class Ft300Emulator:
         return self._streaming
 
     def start(self) -> None:
-        """Appear: create the pty, begin to measure."""
+        """Create the pty and start measuring."""
         self._port.open()
         now_ns = monotonic_ns()
         self._registers.counts = wire.to_counts(self._source.read_ft(now_ns))
@@ -100,20 +100,20 @@ class Ft300Emulator:
         self._at("sample", self._sample_ns(), self._on_sample)
 
     def close(self) -> None:
-        """Vanish; idempotent."""
+        """Remove the pty and stop; idempotent."""
         for timer in self._timers.values():
             timer.cancel()
         self._timers.clear()
         self._port.close()
 
     def stall(self, duration_s: float) -> None:
-        """Say and hear nothing for a while, then go on as if nothing had been."""
+        """Send and receive nothing for a while, then continue as if nothing had happened."""
         self._stalled_until_ns = monotonic_ns() + int(duration_s * NS_PER_S)
 
     def hang_up(self, return_after_s: float | None = None, *, power_cycled: bool = False) -> None:
-        """Unplug the adapter; plug it in again later, at another pty under the same link.
+        """Unplug the adapter and plug it in again later, on another pty under the same link.
 
-        The sensor has its own supply: without `power_cycled` it is found as it was left.
+        The sensor has its own power supply: without `power_cycled` it keeps its state.
         """
         self._port.close()
         self._to_host.clear()
@@ -125,14 +125,14 @@ class Ft300Emulator:
         if return_after_s is not None:
             self._at("return", monotonic_ns() + int(return_after_s * NS_PER_S), lambda _: self._port.open())
 
-    # The sensor's own clock: it measures whether or not anyone listens.
+    # The sensor's own clock: it measures whether or not anyone is connected.
 
     def _sample_ns(self) -> int:
         return round((self._sample_index + self._phase) * self._period_ns)
 
     def _on_sample(self, sample_ns: int) -> None:
         self._registers.counts = wire.to_counts(self._source.read_ft(sample_ns))
-        self._look_at_baud()
+        self._check_baud()
         self._counted["samples"] += 1
         if self._streaming and not self._is_stalled(sample_ns):
             self._send_packet(sample_ns)
@@ -147,20 +147,20 @@ class Ft300Emulator:
     def _send_packet(self, sample_ns: int) -> None:
         self._packets += 1
         knobs = self.knobs
-        if self._to_host.is_busy(sample_ns) or self._is_turn(knobs.drop_packet_every):
+        if self._to_host.is_busy(sample_ns) or self._is_every_nth(knobs.drop_packet_every):
             self._counted["packets_withheld"] += 1
             return
         packet = bytearray(wire.stream_packet(self._registers.counts))
-        if self._is_turn(knobs.corrupt_every):
+        if self._is_every_nth(knobs.corrupt_every):
             packet[5] ^= 0x10
-        if self._is_turn(knobs.drop_byte_every):
+        if self._is_every_nth(knobs.drop_byte_every):
             del packet[7]
-        if self._is_turn(knobs.insert_byte_every):
+        if self._is_every_nth(knobs.insert_byte_every):
             packet.insert(9, 0x20)
         self._counted["packets_sent"] += 1
         self._send(bytes(packet), sample_ns)
 
-    def _is_turn(self, every: int) -> bool:
+    def _is_every_nth(self, every: int) -> bool:
         return every > 0 and self._packets % every == 0
 
     # From the sensor to the host: line, adapter, pty.
@@ -170,13 +170,13 @@ class Ft300Emulator:
         self._schedule_delivery()
 
     def _schedule_delivery(self) -> None:
-        # While nobody listens, one wake-up a packet will do.
+        # While nobody is connected, one wake-up per packet is enough.
         arrival_ns = self._to_host.next_ns() if self._port.attached else self._to_host.free_ns
         if len(self._to_host) and arrival_ns is not None and "deliver" not in self._timers:
             self._at("deliver", next_delivery_ns(arrival_ns, self.latency_ms), self._on_delivery)
 
     def _on_delivery(self, deadline_ns: int) -> None:
-        # What is due now: after a late wake-up, all that the adapter would have handed over since.
+        # Everything due by now: after a late wake-up, all that the adapter would have delivered meanwhile.
         timer_ns = max(self.latency_ms, 1) * NS_PER_MS
         due_ns = monotonic_ns() // timer_ns * timer_ns if self.latency_ms else monotonic_ns()
         began_ns = self._to_host.next_began_ns() or deadline_ns
@@ -194,13 +194,13 @@ class Ft300Emulator:
         self._counted["bytes_garbled"] += len(data)
         return bytes(byte * 167 + 13 & 0xFF for byte in data)
 
-    def _look_at_baud(self) -> None:
+    def _check_baud(self) -> None:
         self._baud_fits = bool(self._port.path) and self._port.baud_is(termios.B19200)
 
     # From the host to the sensor.
 
     def _on_bytes(self, data: bytes) -> None:
-        self._look_at_baud()
+        self._check_baud()
         if not self._baud_fits:
             data = self._garbled(data)
         self._to_sensor.put(data, monotonic_ns())
@@ -209,7 +209,7 @@ class Ft300Emulator:
         self._schedule_hearing()
 
     def _on_sent(self) -> None:
-        """Hear at once what is still on its way: a real client waited for that before its port was closed."""
+        """Process what is still in transit: closing a real port waits until everything has been sent."""
         now_ns = monotonic_ns()
         began_ns = self._to_sensor.next_began_ns()
         data = self._to_sensor.take(self._to_sensor.free_ns)
@@ -233,11 +233,11 @@ class Ft300Emulator:
         self._schedule_hearing()
 
     def _hear(self, data: bytes, began_ns: int, now_ns: int) -> None:
-        # Pauses are those of the line: a host that was held up and hears late has not paused.
+        # Pauses are measured on the line: late processing on this host is not a pause of the client.
         pause_ns = began_ns - self._heard_until_ns
         self._heard_until_ns = min(self._to_sensor.free_ns, now_ns)
         if self._streaming:
-            data = self._look_for_stop(data, now_ns)
+            data = self._find_stop(data, now_ns)
         if data and now_ns >= self._modbus_from_ns:
             if pause_ns > REQUEST_PAUSE_NS:
                 self._scanner.clear()
@@ -245,8 +245,8 @@ class Ft300Emulator:
                 self._counted["requests"] += 1
                 self._serve(request, now_ns)
 
-    def _look_for_stop(self, data: bytes, now_ns: int) -> bytes:
-        """Count 0xFF; whatever else is said to a streaming sensor is ignored. Return what came after the stop."""
+    def _find_stop(self, data: bytes, now_ns: int) -> bytes:
+        """Count 0xFF; a streaming sensor ignores everything else. Return the bytes after the stop."""
         for index, byte in enumerate(data, 1):
             self._stop_bytes_seen = self._stop_bytes_seen + 1 if byte == wire.STOP_BYTE else 0
             if self._stop_bytes_seen >= self.knobs.stop_bytes:
@@ -282,7 +282,7 @@ class Ft300Emulator:
         return now_ns < self._stalled_until_ns
 
     def _at(self, name: str, deadline_ns: int, callback: Callable[[int], None]) -> None:
-        """Call back once at `deadline_ns`, unless a timer of that name is set anew before."""
+        """Call back once at `deadline_ns`, unless a timer of that name is set again before."""
 
         def fire(at_ns: int) -> None:
             self._timers.pop(name, None)

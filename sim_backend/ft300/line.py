@@ -1,8 +1,8 @@
-"""How fast bytes travel between a host and an FT 300: the line's speed and the USB adapter's latency timer. Pure.
+"""Timing of bytes between a host and an FT 300: the line's speed and the USB adapter's latency timer. Pure.
 
-19200 baud with ten bits a byte carries 1920 bytes a second in each direction. An FTDI adapter hands received
-bytes to the host only when its latency timer fires (1 or 16 ms; 0 here stands for "at once"), whatever packets
-they belong to. Not modelled: the adapter's 64-byte buffer (a period of 16 ms never fills it), USB frames,
+19200 baud with ten bits per byte carries 1920 bytes a second in each direction. An FTDI adapter hands received
+bytes to the host only when its latency timer fires (1 or 16 ms; 0 here stands for "at once"), regardless of packet
+boundaries. Not modelled: the adapter's 64-byte buffer (16 ms of data never fill it), USB frames,
 framing errors.
 """
 
@@ -17,7 +17,7 @@ QUEUE_LIMIT = 4096
 
 
 class WireDirection:
-    """One direction of the line: bytes go in at once and arrive one by one, at the line's speed."""
+    """One direction of the line: bytes are put in at once and arrive one by one at the line's speed."""
 
     def __init__(self, *, paced: bool) -> None:
         self._byte_ns = NS_PER_S // BYTES_PER_S if paced else 0
@@ -30,12 +30,12 @@ class WireDirection:
 
     @property
     def free_ns(self) -> int:
-        """When the last byte put in will have arrived."""
+        """When the last queued byte will have arrived."""
         return self._free_ns
 
     @property
     def room(self) -> int:
-        """How many bytes it takes before it is full."""
+        """How many more bytes fit into the queue."""
         return QUEUE_LIMIT - len(self._queue)
 
     def is_busy(self, at_ns: int) -> bool:
@@ -43,7 +43,7 @@ class WireDirection:
         return at_ns < self._free_ns
 
     def put(self, data: bytes, at_ns: int) -> bool:
-        """Put bytes on the wire at `at_ns`, behind those still on it; False (none taken) when the queue is full."""
+        """Put bytes on the wire at `at_ns`, behind those still on it; False (none accepted) if the queue is full."""
         if len(self._queue) + len(data) > QUEUE_LIMIT:
             return False
         arrival_ns = max(at_ns, self._free_ns)
@@ -54,11 +54,11 @@ class WireDirection:
         return True
 
     def next_ns(self) -> int | None:
-        """Return when the next byte arrives; None when nothing is under way."""
+        """Return when the next byte arrives; None when nothing is in transit."""
         return self._queue[0][0] if self._queue else None
 
     def next_began_ns(self) -> int | None:
-        """Return when the next byte began to travel; None when nothing is under way."""
+        """Return when the next byte began to travel; None when nothing is in transit."""
         return self._queue[0][0] - self._byte_ns if self._queue else None
 
     def take(self, until_ns: int) -> bytes:
@@ -69,7 +69,7 @@ class WireDirection:
         return bytes(taken)
 
     def clear(self) -> None:
-        """Lose what is under way."""
+        """Discard what is in transit."""
         self._queue.clear()
         self._free_ns = 0
 

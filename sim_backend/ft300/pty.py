@@ -1,8 +1,8 @@
-"""The pty that stands for an FT 300's serial port: who is listening, at which speed, under which name.
+"""The pty that acts as an FT 300's serial port, with its stable name, client detection and line speed.
 
-The slave is not held open here, so that `fuser` shows the client only; the kernel then reports a hang-up while
-nobody has it open, and what is sent meanwhile is lost, as with a real port. Not modelled: parity (a pty refuses
-to set it), modem lines, and the depth of a real port's buffers (a pty keeps up to 64 kB for a client that has
+The slave is not held open here, so that `fuser` shows only the client; the kernel then reports a hang-up while
+nobody has it open, and bytes sent meanwhile are lost, as with a real port. Not modelled: parity (a pty refuses
+to set it), modem lines, and the size of a real port's buffers (a pty keeps up to 64 kB for a client that has
 it open and does not read).
 """
 
@@ -27,9 +27,9 @@ BAUD_AT_FIRST = termios.B9600
 
 
 class PtyPort:
-    """A pty with its slave in raw mode, served in `loop`; bytes of the client go to `on_bytes`.
+    """A pty with its slave in raw mode, served in `loop`; bytes from the client go to `on_bytes`.
 
-    `on_sent` is called when the client has closed its port: closing a real one waits until all is sent (Linux).
+    `on_sent` is called when the client has closed its port: closing a real port waits until everything is sent (Linux).
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class PtyPort:
         self.attaches = 0
 
     def open(self) -> None:
-        """Create the pty and its link. Raises EnvironmentFault: no pty to be had, or something at the link's place."""
+        """Create the pty and its link. Raises EnvironmentFault when no pty is available or the link's path is taken."""
         if self._link is not None and self._link.exists() and not self._link.is_symlink():
             raise EnvironmentFault(
                 "something that is not a link is in the way", where=str(self._link), do="Choose another name"
@@ -65,7 +65,7 @@ class PtyPort:
                 where="/dev/pts",
                 do="Mount devpts there, or close some terminals",
             ) from error
-        # Before a byte is sent: a cooked line would echo the stream to its sender and change 0x0D to 0x0A.
+        # Before any byte is sent: a cooked line would echo the stream to its sender and change 0x0D to 0x0A.
         tty.setraw(slave)
         attributes = termios.tcgetattr(slave)
         attributes[4] = attributes[5] = BAUD_AT_FIRST
@@ -74,7 +74,7 @@ class PtyPort:
         os.close(slave)
         os.set_blocking(self._master, False)
         self._hang_up_poll = select.poll()
-        self._hang_up_poll.register(self._master, select.POLLIN)  # a hang-up is reported unasked
+        self._hang_up_poll.register(self._master, select.POLLIN)  # a hang-up is always reported
         if self._link is not None:
             beside = self._link.with_name(f"{self._link.name}.{os.getpid()}")
             beside.symlink_to(self.path)
@@ -83,7 +83,7 @@ class PtyPort:
         self._await_client()
 
     def close(self) -> None:
-        """Hang up: the client's port dies as an unplugged adapter does. Idempotent."""
+        """Hang up: the client's port behaves as that of an unplugged adapter. Idempotent."""
         if self._master < 0:
             return
         if self._look is not None:
@@ -98,7 +98,7 @@ class PtyPort:
         self.path = ""
 
     def write(self, data: bytes) -> int:
-        """Send to the client; return how many bytes it took (the rest is lost: not open, or full)."""
+        """Send to the client; return how many bytes were accepted (the rest is lost: port not open, or full)."""
         if not self.attached:
             return 0
         try:
@@ -112,13 +112,13 @@ class PtyPort:
         return bool(input_speed == speed and output_speed == speed)
 
     def pause(self) -> None:
-        """Take nothing from the client until `resume` (its output queue fills up meanwhile)."""
+        """Read nothing from the client until `resume` (its output queue fills up meanwhile)."""
         if self.attached and not self._paused:
             self._paused = True
             self._loop.set_events(self._master, 0)
 
     def resume(self) -> None:
-        """Take bytes again."""
+        """Read bytes again."""
         if self.attached and self._paused:
             self._loop.set_events(self._master, READ)
         self._paused = False
@@ -128,9 +128,9 @@ class PtyPort:
         self._look = self._loop.call_every(LOOK_PERIOD_NS, self._on_look)
 
     def _on_look(self, _deadline_ns: int) -> None:
-        """See whether somebody opened the slave: the hang-up is gone (a client that only listens sends nothing).
+        """Check whether a client opened the slave: the hang-up is gone (a client that only listens sends nothing).
 
-        A client may have opened, written and closed it since the last look.
+        A client may have opened, written and closed it since the last check.
         """
         state = next((events for _, events in self._hang_up_poll.poll(0)), 0)
         if state & select.POLLHUP:
@@ -165,7 +165,7 @@ class PtyPort:
         return b""
 
     def _forget_unread(self) -> None:
-        """Drop what the client left unread: a real port does when it is closed, a pty keeps it for the next one."""
+        """Drop what the client left unread, as closing a real port does; a pty keeps it for the next client."""
         with contextlib.suppress(OSError):
             slave = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             termios.tcflush(slave, termios.TCIFLUSH)

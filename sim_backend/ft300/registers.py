@@ -1,6 +1,6 @@
 """The registers of an emulated FT 300 and its answers to Modbus requests. Pure.
 
-Documented are functions 3 and 16 and the registers below; a real sensor's answer to anything else is not known.
+Functions 3 and 16 and the registers below are documented; a real sensor's answer to anything else is unknown.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from sim_backend.ft300 import wire
 
 REG_WRENCH, REG_ACCELERATION, REG_OUTPUT = 180, 190, 410
 OUTPUT_STREAM = 0x0200
-MOST_STDERR_BYTES = 125
+MOST_REGISTERS = 125
 
 
 class Reply(msgspec.Struct, frozen=True, gc=False):
-    """An answer, and the output that the request selected (None when it selected none)."""
+    """An answer, and the output that the request selected (None: no output selected)."""
 
     answer: bytes
     selected: int | None = None
@@ -41,7 +41,7 @@ class SensorRegisters:
         return self._words.get(address)
 
     def serve(self, request: bytes) -> Reply:
-        """Answer a request (without its CRC). What it selects takes effect with the answer, not here."""
+        """Answer a request (without its CRC). A selected output takes effect when the answer is sent, not here."""
         function = request[1]
         address = request[2] << 8 | request[3]
         if function == wire.FC_READ:
@@ -51,7 +51,7 @@ class SensorRegisters:
         return _refused(function, wire.ILLEGAL_FUNCTION)
 
     def _read(self, address: int, count: int) -> Reply:
-        if not 1 <= count <= MOST_STDERR_BYTES:
+        if not 1 <= count <= MOST_REGISTERS:
             return _refused(wire.FC_READ, wire.ILLEGAL_VALUE)
         words = []
         for offset in range(count):

@@ -11,7 +11,7 @@ from robot_io.messages import Vector6
 ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 LARGEST_FORCE_N = 327.67
 LARGEST_TORQUE_NM = 32.767
-"""What an int16 of the wire can say."""
+"""The range of the wire's int16."""
 
 
 class ConstantWrench:

@@ -1,6 +1,6 @@
-"""What an FT 300 puts on the wire and takes from it, seen from the sensor's side. Pure.
+"""The FT 300's wire format from the sensor's side: what it sends and receives. Pure.
 
-Written down from Robotiq's manual on its own, sharing nothing with the driver: registers are big-endian, the
+Written from Robotiq's manual independently of the driver, with no shared code: registers are big-endian, the
 stream is little-endian, and both end with a CRC-16 (reflected 0xA001, start 0xFFFF), low byte first.
 """
 
@@ -43,9 +43,9 @@ def framed(message: bytes) -> bytes:
 
 
 def to_counts(wrench: Sequence[float]) -> tuple[int, ...]:
-    """Return six int16 for N, N, N, N*m, N*m, N*m: 100 counts a newton, 1000 a newton metre, clipped at int16.
+    """Return six int16 for N, N, N, N*m, N*m, N*m: 100 counts per newton, 1000 per newton metre, clipped at int16.
 
-    Whether a real sensor clips or wraps there is not known.
+    Whether a real sensor clips or wraps is unknown.
     """
     scales = (100, 100, 100, 1000, 1000, 1000)
     return tuple(max(-32768, min(32767, round(value * scale))) for value, scale in zip(wrench, scales, strict=True))
@@ -94,7 +94,7 @@ def identity_words(firmware: str, serial: str, year: int) -> dict[int, int]:
 
 
 class RequestScanner:
-    """Picks Modbus requests out of whatever the line brings, dropping one byte at a time until one fits.
+    """Extracts Modbus requests from the incoming bytes, dropping one byte at a time until a request fits.
 
     A request may follow a run of 0xFF without a pause, because the host's output queue hides pauses.
     """
@@ -104,7 +104,7 @@ class RequestScanner:
         self.junk_bytes = 0
 
     def clear(self) -> None:
-        """Forget a request that was begun."""
+        """Discard an incomplete request."""
         self.junk_bytes += len(self._bytes)
         self._bytes.clear()
 
@@ -126,7 +126,7 @@ class RequestScanner:
         return found
 
     def _length_wanted(self) -> int:
-        """Return how long the request at the front would be; 0 when none can begin there."""
+        """Return how long the request at the front would be; 0 when no request can begin there."""
         head = self._bytes
         if head[0] != SLAVE:
             return 0

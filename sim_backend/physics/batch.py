@@ -1,7 +1,7 @@
 """Many lanes of a simulation study in compiled code: the arithmetic of `lanes.simulate_lane`, 35 times faster.
 
-numba is loaded here and nowhere else, so only sweeps and tuning pay for it. The kernel works in the contact frame
-(angle psi = phi - s/radius on a circle, phi on a face), where a slider is two lever arms: jn, jt.
+numba is loaded here and nowhere else, so only sweeps and tuning need it. The kernel works in the contact frame
+(angle psi = phi - s/radius on a circle, phi on a face), where a slider is described by two lever arms: jn, jt.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
         gain_f, k_y, speed, f_max = lanes[i, 8] + 1.0, lanes[i, 9], lanes[i, 10], lanes[i, 11]
         open_loop = lanes[i, 12] != 0.0
         x, fx, fy = 0.0, 1.0, 0.0
-        v_x, v_y = fx, fy  # the slider's centre moves along the force, so this has the force's direction sooner
+        v_x, v_y = fx, fy  # the slider's centre moves along the force, so this gives the force's direction earlier
         straight = 0.0 if is_round else 1.0
         per_length = 1.0 / reach if is_round else 0.0
         per_d = 1.0 / d

@@ -1,7 +1,7 @@
-"""A slider pushed by an independent ball: contact found, motion solved, drift removed, step by step.
+"""A slider pushed by an independent ball: finds the contact, solves the motion and removes the drift in each step.
 
 The ball does not turn and its centre moves in a straight line within a step. A quasistatic slider without force is at
-rest, so a ball that leaves simply loses it, and the next touch is found in closed form inside the step. WORLD frame
+rest, so it stops when the ball leaves, and the next touch is found in closed form inside the step. WORLD frame
 outside, BODY frame of the slider inside; floats only, so that the same steps give the same bits.
 """
 
@@ -26,12 +26,12 @@ __all__ = ["FREE", "ContactMode", "ContactOutcome", "PushedSlider"]
 TOUCH_M = 1e-9
 """A gap below this is contact."""
 LONGEST_PIECE_M = 1e-3
-"""Longer motions of the ball are cut into pieces of at most this: the answer does not hang on the caller's step."""
+"""Longer motions of the ball are cut into pieces of at most this: the result does not depend on the caller's step."""
 MOST_PIECES = 1000
 REST_M_PER_S = 1e-9
 """Below this speed the ball counts as at rest and the force is held."""
 SMALLEST_BALL_M = 1e-3
-"""A ball is a point (0) or at least this: a smaller one would turn round a corner within a piece."""
+"""A ball is a point (0) or at least this: a smaller one would go round a corner within a piece."""
 _MODES = (ContactMode.STICKING, ContactMode.SLIDING_LEFT, ContactMode.SLIDING_RIGHT)
 
 
@@ -89,7 +89,7 @@ class PushedSlider:
     def step(self, ball_from: tuple[float, float], ball_to: tuple[float, float], dt_s: float) -> ContactOutcome:
         """Move the ball's centre from one point to another (WORLD, m) in `dt_s` (> 0) and return the contact in it.
 
-        Made for steps of about 1 ms. A ball position that is not a number touches nothing.
+        Intended for steps of about 1 ms. A ball position that is not a number touches nothing.
         """
         x, y = ball_from
         dx, dy = ball_to[0] - x, ball_to[1] - y
@@ -99,7 +99,7 @@ class PushedSlider:
             self._outcome = FREE
             return FREE
         if ball_from != self._ball:
-            self._placed(x, y)
+            self._place_ball(x, y)
         self._ball = ball_to
         if not self._touching:
             reach = self._outline.bounding_radius_m + self._radius + moved + TOUCH_M
@@ -107,21 +107,21 @@ class PushedSlider:
                 self._outcome = FREE
                 return FREE
         if moved <= self._piece_m:
-            self._outcome = self._piece(x, y, ball_to[0], ball_to[1], dt_s)
+            self._outcome = self._advance_piece(x, y, ball_to[0], ball_to[1], dt_s)
             return self._outcome
         pieces = min(ceil(moved / self._piece_m), MOST_PIECES)
         for i in range(1, pieces + 1):
             last = i == pieces
             to_x, to_y = ball_to if last else (ball_from[0] + dx * i / pieces, ball_from[1] + dy * i / pieces)
-            self._outcome = self._piece(x, y, to_x, to_y, dt_s / pieces)
+            self._outcome = self._advance_piece(x, y, to_x, to_y, dt_s / pieces)
             x, y = to_x, to_y
         return self._outcome
 
-    def _piece(self, x: float, y: float, to_x: float, to_y: float, dt_s: float) -> ContactOutcome:
+    def _advance_piece(self, x: float, y: float, to_x: float, to_y: float, dt_s: float) -> ContactOutcome:
         """Advance by one short straight motion of the ball."""
         vx, vy = (to_x - x) / dt_s, (to_y - y) / dt_s
         if hypot(vx, vy) < REST_M_PER_S:
-            return self._held()
+            return self._outcome_at_rest()
         done = 0.0
         if not self._touching:
             touch = self._first_touch(x, y, to_x - x, to_y - y)
@@ -133,7 +133,7 @@ class PushedSlider:
             left = (1.0 - done) * dt_s
             v_body_x = self._cos * vx + self._sin * vy
             v_body_y = self._cos * vy - self._sin * vx
-            solution = self._answer(v_body_x, v_body_y)
+            solution = self._respond(v_body_x, v_body_y)
             if not isinstance(solution, Moving):
                 # leaving, or brushing along the face without a normal motion: no force is needed for either
                 self._touching, self._corner = False, -1
@@ -147,15 +147,15 @@ class PushedSlider:
                 break
         return outcome
 
-    def _answer(self, vx: float, vy: float) -> ContactSolution:
-        """Return how the slider answers the ball's velocity (BODY, m/s); notes the push, and the face at a corner."""
+    def _respond(self, vx: float, vy: float) -> ContactSolution:
+        """Return the response to the ball's velocity (BODY, m/s); stores the push, and the face at a corner."""
         floor = self._floor
         solution: ContactSolution = SEPARATING
-        # where the floor holds hangs on the push, and the push on where it holds: last step's push is only a guess
+        # the floor's grip depends on the push, and the push on the grip: last step's push is only an initial guess
         for _ in range(2 if floor is not None and floor.follows_push else 1):
             if floor is not None:
-                self._take_grip(floor)
-            solution = self._solved(vx, vy)
+                self._update_grip(floor)
+            solution = self._solve_contact(vx, vy)
             if not isinstance(solution, Moving):
                 break
             self._push_x, self._push_y = solution.fx, solution.fy
@@ -163,8 +163,8 @@ class PushedSlider:
             self._corner = -1
         return solution
 
-    def _solved(self, vx: float, vy: float) -> ContactSolution:
-        """Solve the contact as it stands, on a face or at a corner."""
+    def _solve_contact(self, vx: float, vy: float) -> ContactSolution:
+        """Solve the current contact, on a face or at a corner."""
         if self._corner < 0:
             return self._solve(
                 self._cx - self._cof_x, self._cy - self._cof_y, self._nx, self._ny, vx, vy,
@@ -177,7 +177,7 @@ class PushedSlider:
         return solution
 
     def _first_touch(self, x: float, y: float, dx: float, dy: float) -> float | None:
-        """Find the first touch of a ball that is clear or just leaving; take its contact."""
+        """Find the first touch of a ball that is clear or just leaving, and set the contact there."""
         bx, by = self._to_body(x, y)
         b_dx, b_dy = self._cos * dx + self._sin * dy, self._cos * dy - self._sin * dx
         nearest = self._outline.nearest(bx, by, self._face)
@@ -187,13 +187,13 @@ class PushedSlider:
             if fraction is None:
                 return None
             nearest = self._outline.nearest(bx + fraction * b_dx, by + fraction * b_dy)
-        self._take_contact(nearest)
+        self._set_contact(nearest)
         if self._corner < 0 and self._nx * b_dx + self._ny * b_dy < 0.0:
             return None
         self._touching = True
         return fraction
 
-    def _take_contact(self, nearest: Nearest) -> None:
+    def _set_contact(self, nearest: Nearest) -> None:
         _, self._nx, self._ny, self._cx, self._cy, self._face = nearest
         self._push_x, self._push_y = self._nx, self._ny
         self._corner = -1
@@ -202,15 +202,15 @@ class PushedSlider:
                 if hypot(row[7] - self._cx, row[8] - self._cy) < TOUCH_M:
                     self._corner, self._cx, self._cy = corner, row[7], row[8]
 
-    def _take_grip(self, floor: Floor) -> None:
-        """Ask the floor what holds the slider now; the push is along the force so far, at a first touch the normal."""
+    def _update_grip(self, floor: Floor) -> None:
+        """Update the floor's grip on the slider; the push is along the last force, or the normal at a first touch."""
         size = hypot(self._push_x, self._push_y)
         self._cof_x, self._cof_y, self._d, self._f_max, self._grain = floor.grip(
             self.x_m, self.y_m, self._cos, self._sin, self._push_x / size, self._push_y / size
         )
 
     def _move(self, solution: Moving, dt_s: float) -> None:
-        """Turn and shift the slider by its twist about the centre of friction."""
+        """Rotate and shift the slider by its twist about the centre of friction."""
         c, s = self._cos, self._sin
         cof_x = self.x_m + c * self._cof_x - s * self._cof_y + (c * solution.vx - s * solution.vy) * dt_s
         cof_y = self.y_m + s * self._cof_x + c * self._cof_y + (s * solution.vx + c * solution.vy) * dt_s
@@ -221,7 +221,7 @@ class PushedSlider:
         self.y_m = cof_y - (s * self._cof_x + c * self._cof_y)
 
     def _remove_drift(self, ball_x: float, ball_y: float) -> None:
-        """Shift the slider along the normal so that the gap is 0 again; the Euler step leaves it in second order."""
+        """Shift the slider along the normal so that the gap is 0 again; the Euler step leaves a second-order error."""
         bx, by = self._to_body(ball_x, ball_y)
         if self._corner >= 0:
             gap_x, gap_y = bx - self._cx, by - self._cy
@@ -238,7 +238,7 @@ class PushedSlider:
         self.y_m += self._sin * gap_x + self._cos * gap_y
 
     def _share_to_corner(self, slip: float, left_s: float) -> float:
-        """Return the share of the remaining time until a point pusher slides off its face; notes the corner."""
+        """Return the share of the remaining time until a point pusher slides off its face; stores the corner."""
         if not self._point_on_polygon or self._corner >= 0 or slip == 0.0:
             return 1.0
         nx, ny, _, low, high, low_x, low_y, high_x, high_y = self._outline.rows[self._face]
@@ -252,18 +252,18 @@ class PushedSlider:
         self._cx, self._cy = (high_x, high_y) if slip > 0.0 else (low_x, low_y)
         return share
 
-    def _placed(self, x: float, y: float) -> None:
-        """Take a ball that did not come from where the last step left it; an overlap pushes the slider out."""
+    def _place_ball(self, x: float, y: float) -> None:
+        """Accept a ball that was moved since the last step; an overlap pushes the slider out."""
         nearest = self._outline.nearest(*self._to_body(x, y))
-        self._take_contact(nearest)
+        self._set_contact(nearest)
         gap = self._radius - nearest[0]
         self._touching = self._touching and gap >= -TOUCH_M
         if gap > 0.0:
             self.x_m += gap * (self._cos * self._nx - self._sin * self._ny)
             self.y_m += gap * (self._sin * self._nx + self._cos * self._ny)
 
-    def _held(self) -> ContactOutcome:
-        """Answer a ball at rest: the force of the last motion stays as long as they touch."""
+    def _outcome_at_rest(self) -> ContactOutcome:
+        """Return the outcome for a ball at rest: the last force is kept as long as they touch."""
         last = self._outcome
         if not self._touching or last.mode in (ContactMode.FREE, ContactMode.HOLDING):
             return last if self._touching else FREE
@@ -282,7 +282,7 @@ class PushedSlider:
         )
 
     def _arguments(self) -> CornerArguments:
-        """Contact minus centre of friction (BODY), and what holds the slider."""
+        """Contact minus centre of friction (BODY), and the floor's grip on the slider."""
         return (self._cx - self._cof_x, self._cy - self._cof_y, self._d, self._f_max, self._mu, self._grain)
 
     def _to_body(self, x: float, y: float) -> tuple[float, float]:
@@ -294,7 +294,7 @@ def _solver(name: str) -> ContactSolver:
     if name == "exact":
         return solve_exact
     if name == "osqp":
-        from sim_backend.physics.slider_qp import QpSolver  # loads osqp and numpy: only when asked for
+        from sim_backend.physics.slider_qp import QpSolver  # loads osqp and numpy: only on request
 
         return QpSolver()
     raise ConfigError(f"there is no solver '{name}'", do="Use 'exact' or 'osqp'")

@@ -28,9 +28,9 @@ class Outline:
         self.bounding_radius_m = shape.bounding_radius_m
 
     def nearest(self, x: float, y: float, likely_face: int = -1) -> Nearest:
-        """Return the outline's nearest feature to a point; a point inside gets the face it is least deep behind.
+        """Return the outline's nearest feature to a point; for a point inside, the face that is nearest to it.
 
-        A face whose strip holds an outside point is the answer at once, so a `likely_face` saves the search.
+        A face whose strip contains an outside point is the answer, so a `likely_face` saves the search.
         """
         if not self.rows:
             return self._nearest_on_circle(x, y)

@@ -1,4 +1,4 @@
-"""What one step of a ball against a slider comes to."""
+"""The outcome of one step of a ball against a slider."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import msgspec
 
 
 class ContactMode(IntEnum):
-    """What the contact does; left and right as seen along the inward normal."""
+    """State of the contact; left and right as seen along the inward normal."""
 
     STICKING = 0
     SLIDING_LEFT = 1
@@ -16,11 +16,11 @@ class ContactMode(IntEnum):
     FREE = 3
     """No contact, or none that needs a force."""
     HOLDING = 4
-    """Ball at rest in contact: the last force stays."""
+    """Ball at rest in contact: the last force is kept."""
 
 
 class ContactOutcome(msgspec.Struct, frozen=True, gc=False):
-    """One step's answer, WORLD frame: force on the slider (N), and where it acts (m) along which inward normal."""
+    """Outcome of one step, WORLD frame: force on the slider (N), and where it acts (m) along which inward normal."""
 
     mode: ContactMode
     force_x: float = 0.0

@@ -1,4 +1,4 @@
-"""A point pusher at a polygon's corner: it clears the corner, goes on along one of the two faces, or sticks there."""
+"""A point pusher at a polygon's corner: it clears the corner, continues along one of the two faces, or sticks there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sim_backend.physics.slider_exact import TINY, ContactSolver, Grain, Moving,
 CornerArguments = tuple[float, float, float, float, float, Grain | None]
 """Contact minus centre of friction x, y (m, BODY), d_m, f_max_N, contact friction, grain of the floor."""
 CornerChoice = tuple[Moving, float, float, int]
-"""The motion, the inward normal x, y (BODY) it was found for, and the face it goes on along (-1: the corner)."""
+"""The motion, the inward normal x, y (BODY) it was found for, and the face it continues along (-1: the corner)."""
 
 
 def solve_at_corner(
@@ -21,7 +21,7 @@ def solve_at_corner(
     vy: float,
     arguments: CornerArguments,
 ) -> CornerChoice | None:
-    """Return how a slider answers a point pusher at corner `corner` (m/s, BODY), or None if the pusher clears it.
+    """Return a slider's response to a point pusher at corner `corner` (m/s, BODY), or None if the pusher clears it.
 
     Any normal between the two faces' is possible at the corner, so the program's aim, the least slip, is met by
     sticking there if that is feasible, and else by the face along which the contact slides away from the corner.

@@ -1,4 +1,4 @@
-"""What the floor does under a pushed slider, beyond the paper's ellipsoid with a fixed centre.
+"""Floor effects on a pushed slider beyond the paper's ellipsoid with a fixed centre.
 
 Four effects, each off by default: the pressure's centre runs ahead of the centre of mass when the push is above the
 floor; a slider pushed straight resists turning by the pressure's spread along the push; the floor resists more along
@@ -20,16 +20,16 @@ from sim_backend.physics.slider import POINT_SHARE_OF_UNIFORM, Pressure, SliderM
 from sim_backend.physics.slider_exact import Grain
 
 Grip = tuple[float, float, float, float, Grain | None]
-"""Centre of friction x, y (m, BODY), d (m), f_max (N) and grain (BODY), at this moment."""
+"""Current centre of friction x, y (m, BODY), d (m), f_max (N) and grain (BODY)."""
 
 SUPPORT_ACROSS = 6
-"""The pressure on a floor of patches is taken at the points of a grid of so many a side."""
+"""The pressure on a floor of patches is sampled at the points of a grid with this many per side."""
 LOOK_AGAIN_M = 0.002
-"""The patches under the slider are looked up again when a point of it has moved about this far."""
+"""The patches under the slider are looked up again after one of its points has moved about this far."""
 
 
 class FloorEffects(msgspec.Struct, frozen=True):
-    """Which effects there are and how strong.
+    """Which effects are present and how strong they are.
 
     shift_m: how far the centre of friction runs ahead along the push force: floor friction times push height.
     turning: `ellipsoid` takes d from the greatest torque (right for spinning on the spot); `along-push` from the
@@ -48,7 +48,7 @@ class FloorEffects(msgspec.Struct, frozen=True):
 
 
 class Floor:
-    """Answers what holds a slider at a pose. Raises ConfigError for effects that make no sense for this slider."""
+    """The floor's grip on a slider at a pose. Raises ConfigError for effects that are impossible for this slider."""
 
     def __init__(self, model: SliderModel, pressure: Pressure, effects: FloorEffects) -> None:
         if not 0 <= effects.shift_m < _room(model.shape, model.cof_m):
@@ -72,7 +72,7 @@ class Floor:
             )
 
     def grip(self, x: float, y: float, cos_: float, sin_: float, push_x: float, push_y: float) -> Grip:
-        """Return what holds the slider at a pose (m; cosine and sine of its heading), pushed along a BODY direction."""
+        """Return the grip on the slider at a pose (m; cosine, sine of its heading), pushed along a BODY direction."""
         model, effects = self._model, self._effects
         cof_x, cof_y = model.cof_m
         d, f_max = model.d_m, model.f_max_N
@@ -98,7 +98,7 @@ class Floor:
 
 
 class _Patches:
-    """The slider's pressure at some points on a floor of patches: how its centre, load and spread change."""
+    """The slider's pressure at sample points on a floor of patches: how its centre, load and spread change."""
 
     def __init__(self, model: SliderModel, points: tuple[Point, ...], field: FrictionField) -> None:
         cof_x, cof_y = model.cof_m

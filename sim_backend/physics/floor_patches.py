@@ -1,7 +1,7 @@
-"""A floor that is not the same everywhere: a seeded random field of friction, without end and without memory.
+"""A floor whose friction varies from place to place: a seeded random field, unbounded and stateless.
 
-Every corner of a square lattice has a value drawn from its place and the seed alone; between corners the field is
-interpolated. Two runs with other seeds differ as two runs in a real room do; with the same seed they are equal.
+Every corner of a square lattice has a value derived only from its place and the seed; between corners the field is
+interpolated. Runs with different seeds differ as runs in a real room do; with the same seed they are equal.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How large k_y may be before a straight push begins to weave: the linear stability of the law, in closed form.
+"""The largest k_y at which a straight push does not start to weave: linear stability of the law, in closed form.
 
 Linearised about the straight push, with rho from contact to centre of mass along the push, d the length that resists
 turning (mean square distance of the pressure along the push, or tau_max/f_max), R the ball's radius, L the pressure's
@@ -9,7 +9,7 @@ shift (floor friction times push height) and a the floor's friction along over a
     circle, sticking     k_y < kappa rho^2/(rho + R) / (a^2 d^2 + rho (rho + L))
     circle, frictionless k_y < kappa / (rho + R)
 
-The law's y_c is of the ball's centre. Derived here; R = 0, L = 0, a = 1 give the paper's point pusher on an even floor.
+The law's y_c is that of the ball's centre. Derived here; R = L = 0, a = 1 is the paper's point pusher on an even floor.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ WARN_SHARE = 0.7
 
 
 class PushedBody(msgspec.Struct, frozen=True):
-    """One slider as the limits see it: m. `rho_m`: half its length along the push, or its radius."""
+    """One slider, described for the limits: m. `rho_m`: half its length along the push, or its radius."""
 
     round: bool
     rho_m: float
@@ -35,7 +35,7 @@ class PushedBody(msgspec.Struct, frozen=True):
 
 
 def sticking_limit(body: PushedBody, k_f: float) -> float:
-    """Return the greatest stable k_y (rad/m) while the contact sticks; 0 or less: none is stable."""
+    """Return the greatest stable k_y (rad/m) while the contact sticks; 0 or less: no k_y is stable."""
     kappa = _kappa(body, k_f)
     rho, ball = body.rho_m, body.ball_radius_m
     lever = rho * rho / (rho + ball) if body.round else rho - ball
@@ -43,7 +43,7 @@ def sticking_limit(body: PushedBody, k_f: float) -> float:
 
 
 def frictionless_limit(body: PushedBody, k_f: float) -> float:
-    """Return the greatest stable k_y (rad/m) of a contact without friction; 0 or less: none is stable."""
+    """Return the greatest stable k_y (rad/m) of a contact without friction; 0 or less: no k_y is stable."""
     kappa = _kappa(body, k_f)
     rho, ball = body.rho_m, body.ball_radius_m
     if body.round:
@@ -61,7 +61,7 @@ def frictionless_limit(body: PushedBody, k_f: float) -> float:
 def limit(bodies: Iterable[PushedBody], k_f: float) -> float:
     """Return the greatest k_y (rad/m) that is stable for every body, whatever the contact friction.
 
-    0 or less: none is; in particular for a k_f at which the force angle itself runs away (`fast_loop_k_f`).
+    0 or less: no k_y is stable, in particular for a k_f at which the force angle itself runs away (`fast_loop_k_f`).
     """
     bodies = tuple(bodies)
     if k_f >= fast_loop_k_f(bodies):
@@ -72,7 +72,7 @@ def limit(bodies: Iterable[PushedBody], k_f: float) -> float:
 def fast_loop_k_f(bodies: Iterable[PushedBody]) -> float:
     """Return the k_f above which the force angle itself runs away from sample to sample while the contact sticks.
 
-    The force angle answers the pushing angle with the slope 1 / (a^2 + rho (rho + L) / d^2), and the law feeds it
+    The force angle responds to the pushing angle with the slope 1 / (a^2 + rho (rho + L) / d^2), and the law feeds it
     back with k_f + 1: their product must stay below 1.
     """
     return min(

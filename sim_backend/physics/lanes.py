@@ -2,10 +2,10 @@
 
 The state is x, y, phi (centre and heading of the slider, path frame), s (the contact's place on the pushed face) and
 the force of the previous step, which the law uses as its measurement. Explicit Euler, every right-hand side at the
-old state. This is the readable reference of `batch.py`, which runs the same in compiled code.
+old state. This is the readable reference for `batch.py`, which computes the same in compiled code.
 
 The pusher is on the slider's -x side; s = 0 is the middle of that face (on a circle: of that side), positive towards
-body +y; a circle's contact lies at the angle pi - s/radius in the body frame.
+body +y; a circle's contact is at the angle pi - s/radius in the body frame.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class LaneEnd(IntEnum):
 
 
 class Lane(msgspec.Struct, frozen=True):
-    """What one lane starts from. `half_width_m` is where the pushed face ends; a circle (`round`) has no end.
+    """Parameters of one lane. `half_width_m` is where the pushed face ends; a circle (`round`) has no end.
 
     reach_m: from the pushed face to the slider's centre (half the length, or the radius). d_m: tau_max/f_max.
     """
@@ -56,7 +56,7 @@ class Lane(msgspec.Struct, frozen=True):
 
 
 class Timing(msgspec.Struct, frozen=True):
-    """How long and how finely: `steps` of `dt_s`; a state is kept at the start and after every `record_every` steps."""
+    """Duration and resolution: `steps` of `dt_s`; a state is recorded at the start and every `record_every` steps."""
 
     dt_s: float = 0.01
     steps: int = 60_000
@@ -64,12 +64,12 @@ class Timing(msgspec.Struct, frozen=True):
 
     @property
     def records(self) -> int:
-        """How many states are recorded."""
+        """Number of recorded states."""
         return self.steps // self.record_every + 1
 
 
 class LaneResult(msgspec.Struct, frozen=True):
-    """How a lane went: steps done, last state, extremes over all its steps, and how long the contact did what."""
+    """Result of a lane: steps done, last state, extremes over all steps, and how long each contact mode lasted."""
 
     end: LaneEnd
     steps: int

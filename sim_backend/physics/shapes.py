@@ -18,7 +18,7 @@ Moment = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """One straight face, BODY frame: inward unit normal, where it lies, and its two ends.
+    """One straight face, BODY frame: inward unit normal, position, and its two ends.
 
     A point p is outside this face by `offset - n . p`; along the face, `u = t . p` with t = (-n_y, n_x) runs from
     `u_low` (at `end_low`) to `u_high` (at `end_high`). All m.
@@ -35,7 +35,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class ConvexPolygon:
-    """A convex polygon by its corners (m, BODY frame, either turning sense, at least three)."""
+    """A convex polygon given by its corners (m, BODY frame, in either direction of rotation, at least three)."""
 
     corners: tuple[Point, ...]
     faces: tuple[Face, ...] = field(init=False, compare=False, repr=False)

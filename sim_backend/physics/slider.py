@@ -1,4 +1,4 @@
-"""What a slider's motion depends on: its shape, the floor's friction under it, and the friction at the contact.
+"""The slider model: its shape, the floor's friction under it, and the friction at the contact.
 
 An impossible slider is a `ConfigError` of one sentence.
 """
@@ -46,7 +46,7 @@ class SliderModel:
 
     @property
     def d_m(self) -> float:
-        """Length tau_max / f_max: all the motion depends on, with the contact friction."""
+        """Length tau_max / f_max: with the contact friction, all that the motion depends on."""
         return self.tau_max_Nm / self.f_max_N
 
     @classmethod

@@ -2,7 +2,7 @@
 
 Contact frame: n the inward unit normal, t = (-n_y, n_x). With c the contact minus the centre of friction, J = (c x n,
 c . n) and d = tau_max/f_max, the velocity of the slider at the contact is w = A h, A = I + J J'/d^2, where h is the
-contact force up to a positive factor. (On a floor with a grain, its matrix P stands for I, and the slider moves along
+contact force up to a positive factor. (On a floor with a grain, its matrix P replaces I, and the slider moves along
 P h.) At a given normal velocity the program's feasible set is a line along which the slip falls strictly with h_t, so
 its solution is the sticking h_t clipped to the friction cone.
 """
@@ -16,7 +16,7 @@ from math import hypot, sqrt
 import msgspec
 
 TINY = 1e-150
-"""Below this an h squares to nothing: the slider counts as at rest (m/s)."""
+"""Below this the square of h underflows to zero: the slider counts as at rest (m/s)."""
 
 
 class Sliding(IntEnum):
@@ -44,7 +44,7 @@ class Moving(msgspec.Struct, frozen=True, gc=False):
 
 
 class Separating(msgspec.Struct, frozen=True, gc=False):
-    """The pusher leaves (normal velocity below 0): no force, the slider stays where it is."""
+    """The pusher separates (normal velocity below 0): no force, and the slider stays where it is."""
 
 
 class AtRest(msgspec.Struct, frozen=True, gc=False):
@@ -59,7 +59,7 @@ class AtRest(msgspec.Struct, frozen=True, gc=False):
 ContactSolution = Moving | Separating | AtRest
 Grain = tuple[float, float, float]
 """Floor that resists more one way than another: xx, xy, yy (BODY) of the symmetric matrix that turns a force into the
-direction of travel, the unit matrix for a floor alike in all directions; f_max_N is the force where it is 1."""
+direction of travel, the unit matrix for an isotropic floor; f_max_N is the force where it is 1."""
 ContactSolver = Callable[[float, float, float, float, float, float, float, float, float, Grain | None], ContactSolution]
 """cx, cy, nx, ny, vx, vy, d_m, f_max_N, contact_friction, grain -> solution, BODY axes (see `solve_exact`)."""
 
@@ -78,11 +78,11 @@ def solve_exact(
     contact_friction: float,
     grain: Grain | None = None,
 ) -> ContactSolution:
-    """Return how the slider answers a pusher velocity (m/s) at a contact, all in BODY axes.
+    """Return the slider's response to a pusher velocity (m/s) at a contact, all in BODY axes.
 
     cx, cy: contact minus centre of friction, m. nx, ny: inward unit normal. d_m > 0, f_max_N > 0,
     contact_friction >= 0. With a wide cone (contact_friction |jn jt| > d^2 + jn^2) a contact may stick and drag the
-    slider at normal velocity 0, and sticking is one of two consistent answers below it; below 0 this always answers
+    slider at normal velocity 0, and sticking is one of two consistent answers below it; below 0 this always returns
     `Separating`, the other one.
     """
     vn = vx * nx + vy * ny

@@ -1,7 +1,7 @@
-"""The paper's program (2) solved with OSQP: the second opinion on `slider_exact`.
+"""The paper's program (2) solved with OSQP, as an independent check of `slider_exact`.
 
 Unknowns are the slip and the slider's velocity at the contact, w = A h, in the contact frame (n, t): with rows of unit
-size the program is well conditioned for every slider. One solver object is reused; every status is checked.
+norm the program is well conditioned for every slider. One solver object is reused; every status is checked.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ AT_REST = 1e-7
 
 
 class QpNotSolved(PushError):
-    """OSQP ended with another status than solved; its numbers are not used."""
+    """OSQP ended with a status other than solved; its result is not used."""
 
 
 class QpSolver:
@@ -51,7 +51,7 @@ class QpSolver:
             eps_rel=TOLERANCE,
             max_iter=MAX_ITERATIONS,
             check_termination=5,
-            # no memory of earlier solves, and nothing that hangs on time: the same question gets the same bits
+            # no warm start and nothing that depends on time: the same problem gives the same bits
             adaptive_rho=False,
             rho=RHO,
             warm_starting=False,
@@ -98,7 +98,7 @@ class QpSolver:
         self._osqp.update(l=self._lower, u=self._upper, Ax=entries, Ax_idx=self._cone_entries)
         result = self._osqp.solve(raise_error=False)
         if result.info.status_val != osqp.SolverStatus.OSQP_SOLVED or not isfinite(float(result.x[0])):
-            raise QpNotSolved(f"OSQP answered '{result.info.status}' to a contact", where="slider_qp")
+            raise QpNotSolved(f"OSQP returned '{result.info.status}' for a contact", where="slider_qp")
         slip, wn, wt = (float(v) for v in result.x)
         hn = inn * wn + int_ * wt
         ht = int_ * wn + itt * wt

@@ -1,6 +1,6 @@
 """An emulated Ridgeback behind a rosbridge websocket: server, ROS graph, the robot's nodes, motion capture.
 
-Single-threaded inside an event loop. The base itself is the `source`: every command that gets through is given
+Single-threaded inside an event loop. The base itself is the `source`: every command that gets through is passed
 to it with its arrival time.
 """
 
@@ -27,9 +27,9 @@ _MAX_HELD = 50_000
 
 
 class RosbridgeEmulator:
-    """Serves `ws://host:port` from `loop` until `close`; `port` 0 takes any free one (`url` says which).
+    """Serves `ws://host:port` from `loop` until `close`; `port` 0 picks a free one (see `url`).
 
-    Raises UsageError (no loopback address), ConfigError (topics that cannot be), EnvironmentFault (port taken).
+    Raises UsageError (not a loopback address), ConfigError (impossible topics), EnvironmentFault (port taken).
     """
 
     def __init__(
@@ -51,9 +51,9 @@ class RosbridgeEmulator:
         self._outbox: deque[tuple[int, WebSocketPeer, str]] = deque(maxlen=_MAX_HELD)
         self._release_timer: Timer | None = None
         self.lag_ns = 0
-        """Everything to the clients comes so much later."""
+        """Delay of everything sent to the clients."""
         self.hold_ns = 0
-        """Everything to the clients waits for the next multiple of this."""
+        """Everything sent to the clients waits for the next multiple of this time."""
         self.zero_on_new_connection = bridge.zero_on_new_connection
         types = RosTypes(settings.topics.ros_version, lambda: self._stamp(monotonic_ns()))
         self.graph = RosGraph(types)
@@ -92,7 +92,7 @@ class RosbridgeEmulator:
         }
 
     def release(self, _: int = 0) -> None:
-        """Send what was held back and is due by now; nothing while frozen."""
+        """Send delayed messages that are due by now; nothing while frozen."""
         self._release_timer = None
         while self.server.running and self._outbox and self._outbox[0][0] <= monotonic_ns():
             _, peer, text = self._outbox.popleft()
@@ -126,7 +126,7 @@ class RosbridgeEmulator:
 
     def _on_text(self, peer: WebSocketPeer, text: str) -> None:
         session = self._sessions.get(peer)
-        if session is not None:  # None: a message before it made us drop this client
+        if session is not None:  # None: this client was dropped because of an earlier message
             self._counters["received"] += 1
             session.incoming(text)
 

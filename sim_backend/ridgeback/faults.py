@@ -1,4 +1,4 @@
-"""What can go wrong with a base behind a bridge, on request: times in s, from now on."""
+"""Fault injection for a base behind a bridge: times in s, from now."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sim_backend.ridgeback.websocket_server import WebSocketPeer
 
 _JOYSTICK_PERIOD_NS = NS_PER_S // 20
 _BURST_OUT_NS = 1_000_000
-"""After a freeze the backlog of the clients is read first, then theirs goes out."""
+"""After a freeze the clients' backlog is read first; then the outgoing backlog is sent."""
 
 
 class BridgeFaults:
@@ -26,7 +26,7 @@ class BridgeFaults:
         self._timers: list[Timer] = []
 
     def freeze(self, seconds: float) -> None:
-        """Stop the bridge's process; afterwards it works off its backlog, in and out, in one burst."""
+        """Stop the bridge's process; afterwards it processes its backlog, in and out, in one burst."""
         self._emulator.server.set_running(False)
         self._after(seconds, self._thaw)
 
@@ -35,28 +35,28 @@ class BridgeFaults:
         self._emulator.server.kill()
 
     def restart(self, after_s: float) -> None:
-        """Kill it, and start it again on the same port; clients must connect and subscribe anew."""
+        """Kill it, and start it again on the same port; clients must reconnect and subscribe again."""
         self.kill()
         self._after(after_s, self._emulator.server.listen)
 
     def half_open(self) -> None:
-        """Swallow every packet of the present clients, both ways; nobody is told."""
+        """Drop every packet of the current clients silently, in both directions."""
         for peer in list(self._emulator.server.peers):
             peer.silent = True
             peer.watch(False)
 
     def stop_reading(self, seconds: float) -> None:
-        """Read nothing from the present clients, but go on sending to them."""
+        """Read nothing from the current clients, but continue sending to them."""
         peers = list(self._emulator.server.peers)
         self._set_reading(peers, False)
         self._after(seconds, lambda: self._set_reading(peers, True))
 
     def lag(self, seconds: float) -> None:
-        """Delay everything to the clients by so much (0 ends it); stamps grow old on the way."""
+        """Delay everything sent to the clients by this time (0 ends it); stamps age meanwhile."""
         self._emulator.lag_ns = round(seconds * NS_PER_S)
 
     def hold(self, seconds: float) -> None:
-        """Let messages to the clients out only at multiples of this, as Nagle's algorithm may (0 ends it)."""
+        """Send messages to the clients only at multiples of this time, as Nagle's algorithm may (0 ends it)."""
         self._emulator.hold_ns = round(seconds * NS_PER_S)
 
     def occlude_base(self, seconds: float) -> None:
@@ -68,28 +68,28 @@ class BridgeFaults:
         self._emulator.mocap.slider_hidden_until_ns = monotonic_ns() + round(seconds * NS_PER_S)
 
     def jump_pose(self, offset: Pose2D, seconds: float) -> None:
-        """Let motion capture see the base elsewhere (m, m, rad), as when markers are mislabelled."""
+        """Shift the base's pose in motion capture (m, m, rad), as when markers are mislabelled."""
         self._emulator.mocap.offset = offset
         self._after(seconds, lambda: setattr(self._emulator.mocap, "offset", Pose2D()))
 
     def subscriber_missing(self, missing: bool = True) -> None:
-        """Let nobody listen to the commands."""
+        """Remove the subscribers of the command topics, or restore them."""
         self._emulator.nodes.set_listening(not missing)
 
     def press_stop(self) -> None:
-        """Press a hardware stop: motors off, wheels held, status at once."""
+        """Press a hardware stop: motors off, wheels locked, status published at once."""
         self._status(stop_engaged=True, drivers_active=False)
 
     def release_stop(self) -> None:
-        """Release it and press reset: motors on."""
+        """Release the stop and press reset: motors on."""
         self._status(stop_engaged=False, drivers_active=True)
 
     def battery(self, volt: float) -> None:
-        """Set the battery's voltage; seen with the next status (1 Hz)."""
+        """Set the battery's voltage; visible in the next status (1 Hz)."""
         self._status(battery_v=volt)
 
     def joystick(self, twist: BodyTwist, seconds: float) -> None:
-        """Drive by joystick at 20 Hz; it outranks everybody else, and half a second longer."""
+        """Drive by joystick at 20 Hz; it overrides all other inputs until half a second afterwards."""
         until_ns = monotonic_ns() + round(seconds * NS_PER_S)
 
         def press(now_ns: int) -> None:
@@ -102,7 +102,7 @@ class BridgeFaults:
         self._timers.append(timer)
 
     def close(self) -> None:
-        """End what is still to come."""
+        """Cancel all pending faults."""
         for timer in self._timers:
             timer.cancel()
 

@@ -22,9 +22,9 @@ _AMPERE_IDLE = 3.2
 
 
 class FeedWriter:
-    """Builds messages; counts the sequence numbers of ROS 1 headers by topic.
+    """Builds messages; counts the sequence numbers of ROS 1 headers per topic.
 
-    `stamp` turns a monotonic time (ns) into the header's time in the spelling of the ROS version.
+    `stamp` turns a monotonic time (ns) into the header's time in the format of the ROS version.
     `base_from_marker`: x, y, yaw of the marker frame in the BODY frame: motion capture sees the markers.
     """
 
@@ -37,13 +37,13 @@ class FeedWriter:
         self._sequence: Counter[str] = Counter()
 
     def base_transform(self, topic: str, pose: Pose2D, t_ns: int) -> Message:
-        """Motion capture of the base's markers: geometry_msgs/TransformStamped."""
+        """Return motion capture's message for the base's markers: geometry_msgs/TransformStamped."""
         ahead, left, turn = self._marker
         x, y = point_outside(pose.x, pose.y, pose.yaw, ahead, left)
         return self.transform(topic, Pose2D(x, y, pose.yaw + turn), t_ns)
 
     def transform(self, topic: str, pose: Pose2D, t_ns: int) -> Message:
-        """Motion capture of a segment; the topic names it (/vicon/<subject>/<segment>)."""
+        """Return motion capture's message for a segment; the topic names it (/vicon/<subject>/<segment>)."""
         return {
             "header": self._header(topic, "/odom" if self._ros1 else "odom", t_ns),
             "child_frame_id": topic.lstrip("/"),
@@ -83,7 +83,7 @@ class FeedWriter:
         }
 
     def status(self, topic: str, status: BaseStatus, up_ns: int, t_ns: int) -> Message:
-        """ridgeback_msgs/Status of the microcontroller; `up_ns`: since when it runs."""
+        """ridgeback_msgs/Status of the microcontroller; `up_ns`: when it was started."""
         uptime = self._duration(t_ns - up_ns)
         return {
             "header": self._header(topic, "", t_ns),
@@ -123,13 +123,13 @@ class FeedWriter:
 
 
 def twist_of(message: Message) -> BodyTwist:
-    """Return what the wheels take of a Twist or TwistStamped: linear x and y, angular z; the rest is ignored."""
+    """Return the velocity in a Twist or TwistStamped: linear x and y, angular z; the rest is ignored."""
     twist = message.get("twist", message)
     return BodyTwist(twist["linear"]["x"], twist["linear"]["y"], twist["angular"]["z"])
 
 
 def seen_from(origin: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return `pose` in the frame of `origin`: odometry counts from where it started."""
+    """Return `pose` in the frame of `origin`: odometry is relative to where it started."""
     x, y = seen_from_frame(pose.x - origin.x, pose.y - origin.y, origin.yaw)
     return Pose2D(x, y, wrap_angle(pose.yaw - origin.yaw))
 

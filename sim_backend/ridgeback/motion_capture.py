@@ -1,7 +1,7 @@
-"""The motion capture of the emulated laboratory and the base pose made of it, on the ROS graph.
+"""The motion capture of the emulated laboratory, and the base pose derived from it, on the ROS graph.
 
-A pose is that of `mocap_latency_s` ago, and is stamped so. An occluded body publishes nothing: no flag, the last
-pose just grows old.
+A pose is that of `mocap_latency_s` ago, and is stamped accordingly. For an occluded body nothing is published: there is
+no flag, the last pose just becomes stale.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sim_backend.world.plant import BaseSource
 
 
 class MotionCapture:
-    """Publishes the base's markers, the object and /ridgeback/joint_states on one grid from `start_ns` on."""
+    """Publishes the base's markers, the object and /ridgeback/joint_states on one time grid, starting at `start_ns`."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class MotionCapture:
         self._settings = settings
         self._jitter = random.Random(1)
         self.offset = Pose2D()
-        """Added to what is seen of the base (a pose jump): m, m, rad."""
+        """Offset added to the measured pose of the base (a pose jump): m, m, rad."""
         self.base_hidden_until_ns = 0
         self.slider_hidden_until_ns = 0
         topics = settings.topics
@@ -49,7 +49,7 @@ class MotionCapture:
         self._timer = loop.call_every(period_ns, self._frame, first_ns)
 
     def close(self) -> None:
-        """Publish nothing more."""
+        """Stop publishing."""
         self._timer.cancel()
 
     def _frame(self, t_ns: int) -> None:

@@ -1,8 +1,8 @@
 """The nodes of an emulated Ridgeback on the ROS graph: multiplexer, wheels, odometry, microcontroller.
 
 Rates: wheel odometry 25 Hz (the wheel controller's tick), filtered odometry 50 Hz, status 1 Hz and at once on a
-change; each on an absolute grid of its own. A command topic that is no input of the multiplexer is taken for
-the authors' relay, which feeds the wheels past it.
+change; each on its own absolute time grid. A command topic that is not an input of the multiplexer is treated as
+the authors' relay, which bypasses the multiplexer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STATUS_RATE_HZ = 1.0
 
 
 class RidgebackNodes:
-    """Publishes and listens on `graph` from `start_ns` (CLOCK_MONOTONIC) on, until `close`."""
+    """Publishes and subscribes on `graph` from `start_ns` (CLOCK_MONOTONIC) until `close`."""
 
     def __init__(
         self,
@@ -69,7 +69,7 @@ class RidgebackNodes:
             self._timers.append(loop.call_every(period_ns, tick, start_ns + round(phase * period_ns)))
 
     def set_listening(self, on: bool) -> None:
-        """Let the nodes behind the command topics listen, or be missing."""
+        """Subscribe the nodes behind the command topics, or unsubscribe them."""
         for name in self.command_topics:
             self._listen(name, MUX_NODE, self._listener(name) if on else None)
         self._listen(DIRECT_TOPIC, WHEEL_NODE, self._drive if on else None)
@@ -84,7 +84,7 @@ class RidgebackNodes:
             self._status_tick(now_ns)
 
     def joystick(self, twist: BodyTwist) -> None:
-        """Somebody drives by joystick, once; it outranks everybody else for half a second."""
+        """Send one joystick command; it overrides all other inputs for half a second."""
         topic = self._graph.topics[JOYSTICK]
         message: Message = {"linear": {"x": twist.vx, "y": twist.vy}, "angular": {"z": twist.omega}}
         if topic.type_name.endswith("TwistStamped"):
@@ -92,11 +92,11 @@ class RidgebackNodes:
         self._graph.publish(topic, self._graph.types.filled(topic.type_name, message))
 
     def zero_once(self) -> None:
-        """Give the wheels one zero, as seen when somebody new connects to the command topic."""
+        """Send one zero to the wheels, as observed when a new client connects to the command topic."""
         self._source.command_base(BodyTwist(), monotonic_ns())
 
     def close(self) -> None:
-        """Publish nothing more."""
+        """Stop publishing."""
         for timer in self._timers:
             timer.cancel()
 

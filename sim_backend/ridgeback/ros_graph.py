@@ -1,7 +1,7 @@
-"""The ROS graph behind the emulated bridge: topics with their types, who publishes, who listens.
+"""The ROS graph behind the emulated bridge: topics with their types, publishers and subscribers.
 
-A message is a plain dict of JSON-able values. Nodes of the robot listen with a function; clients of the bridge
-listen with a `Subscription`, which gets the message's JSON, made once for all of them.
+A message is a plain dict of JSON-compatible values. The robot's nodes subscribe with a function; clients of the bridge
+subscribe with a `Subscription`, which gets the message's JSON, encoded once for all of them.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ BRIDGE_NODE = "/rosbridge_websocket"
 
 
 class Subscription(Protocol):
-    """A client's interest in a topic."""
+    """A client's subscription to a topic."""
 
     def deliver(self, message_json: str) -> None:
-        """Take one message."""
+        """Deliver one message."""
         ...
 
 
 class Topic:
-    """One topic. `nodes` publish on it, and so do the clients in `advertisers`, who are all one node, the bridge."""
+    """One topic. `nodes` publish on it, and so do the clients in `advertisers`, which count as one node, the bridge."""
 
     def __init__(self, name: str, type_name: str) -> None:
         self.name = name
@@ -45,7 +45,7 @@ class Topic:
         return sorted([*self.nodes, *([BRIDGE_NODE] if self.advertisers else [])])
 
     def subscribers(self) -> list[str]:
-        """Return the names of the nodes that listen."""
+        """Return the names of the nodes that subscribe."""
         return sorted([*self.listeners, *([BRIDGE_NODE] if self.subscriptions else [])])
 
 
@@ -62,7 +62,7 @@ class RosGraph:
         return name if name.startswith("/") else f"/{name}"
 
     def declare(self, name: str, type_name: str) -> Topic | None:
-        """Return the topic of that name and type, made if new; None when it has another type or the type is unknown."""
+        """Return the topic of that name and type, created if new; None if its type differs or is unknown."""
         canonical = self.types.canonical(type_name)
         if canonical is None:
             return None
@@ -73,7 +73,7 @@ class RosGraph:
         return topic
 
     def provide(self, name: str, type_name: str, node: str = "") -> Topic:
-        """Declare a topic of the robot itself, on which `node` publishes. Raises ConfigError when it cannot be."""
+        """Declare a topic of the robot itself, on which `node` publishes. Raises ConfigError if that fails."""
         topic = self.declare(name, type_name.replace("/msg/", "/"))  # a rig file may spell it either way
         if topic is None:
             raise ConfigError(
@@ -86,16 +86,16 @@ class RosGraph:
         return topic
 
     def find(self, name: str) -> Topic | None:
-        """Return a topic by a name that needs no type: its full one, or another that came with a type before."""
+        """Return a topic by name alone: its full name, or another one that was declared with a type before."""
         return self.topics.get(self.resolve(name) if name in self._spellings else name)
 
     def wanted(self, name: str) -> bool:
-        """Return whether anybody listens."""
+        """Return whether the topic has subscribers."""
         topic = self.topics.get(name)
         return topic is not None and bool(topic.subscriptions or topic.listeners)
 
     def publish(self, topic: Topic, message: Message, *, latch: bool = False) -> None:
-        """Give a complete message to everybody who listens."""
+        """Deliver a complete message to all subscribers."""
         if latch:
             topic.latched = message
         for listen in list(topic.listeners.values()):

@@ -1,7 +1,7 @@
-"""The ROS message types that the emulated bridge knows, and the checks a real one makes of a message's fields.
+"""The ROS message types that the emulated bridge knows, and the checks that a real one applies to a message's fields.
 
-Checks as observed: a missing field is zero, an int passes for a float, NaN and infinity pass; a string, boolean,
-null or list in place of a number, and a field the type does not have, make the whole message void. A header
+Checks as observed: a missing field is zero, an int is accepted as a float, and so are NaN and infinity; a string,
+boolean, null or list in place of a number, or a field the type does not have, makes the message invalid. A header
 without stamp gets the robot's time (ROS 1 always, ROS 2 only when the header itself is there).
 Source of the definitions: the .msg files of std_msgs, geometry_msgs, nav_msgs, sensor_msgs, ridgeback_msgs.
 """
@@ -76,7 +76,7 @@ class RosTypes:
         self._now = now
 
     def canonical(self, name: object) -> str | None:
-        """Return the known type of that name as this ROS version spells it, or None."""
+        """Return the type's name as this ROS version spells it, or None if it is unknown."""
         if not isinstance(name, str):
             return None
         if not self._ros2:
@@ -87,19 +87,19 @@ class RosTypes:
         return f"{match[1]}/msg/{match[2]}"
 
     def time(self, stamp: RosTime) -> dict[str, int]:
-        """Return a time as this ROS version writes it."""
+        """Return a time in this ROS version's format."""
         return {"sec": stamp[0], "nanosec": stamp[1]} if self._ros2 else {"secs": stamp[0], "nsecs": stamp[1]}
 
     def filled(self, type_name: str, message: object) -> dict[str, Any]:
-        """Check a message and fill in what it leaves out. Raises BadMessage."""
+        """Check a message and fill in missing fields. Raises BadMessage."""
         filled: dict[str, Any] = self._value(type_name.replace("/msg/", "/"), message, type_name)
         return filled
 
     def full_text(self, type_name: str) -> str:
-        """Return a type's definition with all it is made of, as `gendeps --cat` prints it (genmsg)."""
+        """Return a type's definition with all nested types, as `gendeps --cat` prints it (genmsg)."""
         kind = type_name.replace("/msg/", "/")
         kinds, texts = [kind], list[str]()
-        for nested in kinds:  # grows while it is walked
+        for nested in kinds:  # grows while it is iterated
             fields = self._fields_of(nested)
             texts.append("".join(f"{field} {name}\n" for name, field in fields))
             kinds += dict.fromkeys(field for _, field in fields if "/" in field and field not in kinds)

@@ -12,7 +12,7 @@ Answer = tuple[bool, Any]
 
 
 class RosApi:
-    """Answers service calls: (True, values) or (False, a sentence)."""
+    """Answers service calls: (True, values) or (False, error text)."""
 
     def __init__(self, graph: RosGraph, now: Callable[[], RosTime]) -> None:
         self._graph = graph
@@ -34,7 +34,7 @@ class RosApi:
         }
 
     def call(self, service: str, arguments: object) -> Answer:
-        """Call a service with an object of named arguments or a list in order; what is missing or neither is empty."""
+        """Call a service with an object of named arguments or an ordered list; missing arguments are empty."""
         name = self._graph.resolve(service)
         if name not in self._services:
             return False, f"Service {name} does not exist"

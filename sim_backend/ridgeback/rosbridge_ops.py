@@ -1,10 +1,10 @@
-"""One client's side of the emulated bridge: the rosbridge v2 operations, and a server's silence about errors.
+"""One client's side of the emulated bridge: the rosbridge v2 operations, where errors are ignored silently.
 
-What a client gets wrong is counted here and never answered. Parsing follows the real server: the whole buffer as
-JSON first, else the first object in it that parses; an object without `op` found that way is thrown away but
-its text stays in the buffer, so that a message cut short poisons the connection for good. JSON that breaks the
-server's own code (a bare number or boolean, an `op` that cannot be looked up) ends the thread that works for this
-client: what it sends later is never looked at, while its subscriptions go on.
+A client's errors are counted here and never answered. Parsing follows the real server: the whole buffer as
+JSON first, else the first object in it that parses; an object without `op` found that way is discarded but
+its text stays in the buffer, so that a truncated message breaks the connection permanently. JSON that breaks the
+server's own code (a bare number or boolean, an `op` that cannot be looked up) ends the thread that serves this
+client: what it sends later is never read, while its subscriptions continue.
 Not modelled: png and cbor compression (plain JSON is sent), outgoing fragments, authentication.
 Source: rosbridge protocol document, and the behaviour of rosbridge_suite 0.11.17.
 """
@@ -23,7 +23,7 @@ from sim_backend.ridgeback.ros_types import BadMessage
 from sim_backend.ridgeback.rosapi import RosApi
 
 UNREGISTER_NS = 10 * NS_PER_S
-"""A client that is gone still counts as publisher for this long."""
+"""A disconnected client still counts as publisher for this long."""
 _MAX_BUFFER = 1_000_000
 
 
@@ -32,9 +32,9 @@ class _Wrong(Exception):
 
 
 class ClientSubscription:
-    """A client's subscription to a topic: spacing in ms, and how many messages wait for it.
+    """A client's subscription to a topic: spacing in ms, and how many messages may be queued.
 
-    Several subscribe requests of one client are one subscription with the smallest spacing and queue of all.
+    Several subscribe requests of one client form one subscription with the smallest spacing and queue length of all.
     """
 
     def __init__(self, loop: EventLoop, send: Callable[[str], None], head: str) -> None:
@@ -54,7 +54,7 @@ class ClientSubscription:
         self._merge()
 
     def remove(self, request_id: object) -> bool:
-        """Take one request back (None: all); tell whether none is left."""
+        """Remove one request (None: all); return whether none is left."""
         if request_id is None:
             self._requests.clear()
         self._requests.pop(request_id, None)
@@ -62,7 +62,7 @@ class ClientSubscription:
         return not self._requests
 
     def deliver(self, message_json: str) -> None:
-        """Send a message, keep it until its time, or drop it."""
+        """Send a message, queue it until it is due, or drop it."""
         now_ns = monotonic_ns()
         due_ns = self._last_ns + self._spacing_ns
         if now_ns >= due_ns and not self._waiting:
@@ -75,7 +75,7 @@ class ClientSubscription:
                 self._timer = self._loop.call_at(due_ns, self._send_waiting)
 
     def close(self) -> None:
-        """Send nothing more."""
+        """Stop sending."""
         self._waiting.clear()
         if self._timer is not None:
             self._timer.cancel()
@@ -97,7 +97,7 @@ class ClientSubscription:
 
 
 class Session:
-    """One connected client. `incoming` takes its texts; `send` gives it ours."""
+    """One connected client. `incoming` receives its texts; `send` sends it ours."""
 
     def __init__(
         self,
@@ -133,8 +133,8 @@ class Session:
         }
 
     def incoming(self, text: str) -> None:
-        """Take one text frame."""
-        if len(self._buffer) < _MAX_BUFFER:  # a poisoned buffer never recovers; no need to let it grow
+        """Process one text frame."""
+        if len(self._buffer) < _MAX_BUFFER:  # a broken buffer never recovers, so it need not grow
             self._buffer += text
         before = None
         while self._buffer and self._buffer != before and not self._worker_died:
@@ -144,7 +144,7 @@ class Session:
                 self._perform(message)
 
     def close(self) -> None:
-        """Forget the client: its subscriptions at once, its publishing after a while."""
+        """Remove the client: its subscriptions at once, its publishers after a while."""
         for topic, subscription in self._subscriptions.values():
             self._drop_subscription(topic, subscription)
         self._subscriptions.clear()
@@ -218,7 +218,7 @@ class Session:
         topic = self._graph.declare(name, request["type"]) if "type" in request else self._graph.find(name)
         if topic is None:
             raise _Wrong("unknown type, or another one than the topic's")
-        if name not in self._subscriptions:  # another spelling of the same topic is another subscription
+        if name not in self._subscriptions:  # each spelling of a topic's name is a subscription of its own
             head = f'{{"op":"publish","topic":{json.dumps(name)},"msg":'
             self._subscriptions[name] = topic, ClientSubscription(self._loop, self._send, head)
             topic.subscriptions.append(self._subscriptions[name][1])
@@ -237,7 +237,7 @@ class Session:
     def _call_service(self, request: Message) -> None:
         service = _text(request, "service")
         _check_options(request, {"compression": str, "fragment_size": (int, type(None))})
-        name, _, old_id = service.partition("#")  # an old way to write the id
+        name, _, old_id = service.partition("#")  # an old notation of the id
         if self._rosapi is None:
             ok, values = False, f"Service {self._graph.resolve(name)} does not exist"
         else:
@@ -288,7 +288,7 @@ def _text(request: Message, key: str) -> str:
 
 
 def _check_options(request: Message, kinds: Mapping[str, type | tuple[type, ...]]) -> None:
-    """Check fields that may be left out: there, but null, is wrong."""
+    """Check the types of optional fields: they may be missing, but not null."""
     for key, kind in kinds.items():
         if key in request and not isinstance(request[key], kind):
             raise _Wrong(f"{key} has the wrong type")

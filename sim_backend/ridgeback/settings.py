@@ -17,9 +17,9 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
     mocap_rate_hz: float = 100.007
     mocap_phase: float = 0.29
     mocap_latency_s: float = 0.004
-    """A pose is published this long after it was."""
+    """A pose is published this long after it was measured."""
     mocap_jitter_s: float = 0.0
-    """Poses come up to this much later still, at random; less than a period, or they change places."""
+    """Poses are delayed by up to this much more, at random; less than a period, so that their order is kept."""
     base_phase: float = 0.53
     base_rate_error: float = 0.0001
     base_from_marker: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
         return self.topics.slider_pose or DEFAULT_SLIDER_TOPIC
 
     def resolved(self) -> RidgebackSettings:
-        """Return the same with every topic as the robot knows it, from the root on."""
+        """Return the same settings with every topic's full name."""
         names = {
             field: value if value.startswith("/") else f"/{value}"
             for field, value in msgspec.structs.asdict(self.topics).items()
@@ -53,17 +53,17 @@ def ridgeback_settings(rig: RigConfig) -> RidgebackSettings:
 
 
 class BridgeSettings(msgspec.Struct, frozen=True):
-    """Habits of the emulated bridge process."""
+    """Behaviour of the emulated bridge process."""
 
     escape_slashes: bool = True
-    """Write slashes in JSON as `\\/`, as the server does with one of its two JSON libraries."""
+    """Write slashes in JSON as `\\/`, as the server does with one of its two possible JSON libraries."""
     nagle: bool = False
     """Leave the kernel's Nagle algorithm on, as the server does with newer versions of autobahn."""
     rosapi: bool = True
-    """The rosapi node runs."""
+    """Whether the rosapi node runs."""
     ping_interval_s: float = 0.0
     ping_timeout_s: float = 0.0
     clock_skew_s: float = 0.0
-    """The robot's wall clock is ahead of this machine's by so much."""
+    """How far the robot's wall clock is ahead of this machine's."""
     zero_on_new_connection: bool = False
-    """The base gets one zero whenever somebody new publishes on or subscribes to its command topic."""
+    """Whether the base gets one zero when a new client publishes on or subscribes to its command topic."""

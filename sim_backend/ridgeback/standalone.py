@@ -1,4 +1,4 @@
-"""A Ridgeback alone: wheels on a floor without the rest of the world, for `push emulate ridgeback`."""
+"""A Ridgeback on its own: wheels on a floor without the rest of the world, for `push emulate ridgeback`."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from sim_backend.world.base_plant import BasePlant
 from sim_backend.world.plant import BaseTruth
 
 SLIDER_POSE = Pose2D(1.3, 0.0, 0.0)
-"""The object stands a little ahead of the base; nothing ever touches it here."""
+"""The object is a little ahead of the base; nothing ever touches it here."""
 
 
 class StandaloneBase:
-    """A `BaseSource` made of the wheels alone, starting at `start` (WORLD frame) at `start_ns`."""
+    """A `BaseSource` that consists of the wheels only, starting at `start` (WORLD frame) at `start_ns`."""
 
     def __init__(self, settings: RidgebackSettings, start_ns: int, start: Pose2D = Pose2D()) -> None:  # noqa: B008 - frozen
         self.plant = BasePlant(start, start_ns, tick_phase=settings.base_phase, rate_error=settings.base_rate_error)
@@ -26,16 +26,16 @@ class StandaloneBase:
         return BaseTruth(self.plant.pose, self.plant.velocity)
 
     def read_slider(self, t_ns: int) -> Pose2D:
-        """Return where the object stands."""
+        """Return the object's pose."""
         del t_ns  # it never moves
         return SLIDER_POSE
 
     def command_base(self, twist: BodyTwist, arrival_ns: int) -> None:
-        """Give the wheels a command."""
+        """Send the wheels a command."""
         self.plant.command(twist, arrival_ns)
 
     def set_drivers(self, active: bool, at_ns: int) -> None:
-        """Switch the motors."""
+        """Switch the motors on or off."""
         self.plant.set_drivers(active, at_ns)
 
 
@@ -47,6 +47,6 @@ def standalone_emulator(
     settings: RidgebackSettings = RidgebackSettings(),  # noqa: B008 - frozen
     bridge: BridgeSettings = BridgeSettings(),  # noqa: B008 - frozen
 ) -> RosbridgeEmulator:
-    """Serve a Ridgeback that stands alone from `loop`; raises what `RosbridgeEmulator` raises."""
+    """Serve a Ridgeback without a world from `loop`; raises what `RosbridgeEmulator` raises."""
     source = StandaloneBase(settings, monotonic_ns())
     return RosbridgeEmulator(loop, source, host=host, port=port, settings=settings, bridge=bridge)

@@ -1,6 +1,6 @@
-"""The velocity multiplexer of a Ridgeback, pure: of all who want to drive, the one with the highest priority may.
+"""The velocity multiplexer of a Ridgeback, pure: of all active inputs, the one with the highest priority drives.
 
-An input counts for its timeout after its last message. A lock whose last message was `true` masks every input
+An input is active until its timeout after its last message. A lock whose last message was `true` masks every input
 of lower priority; the stock lock never expires. A masked message is dropped: no zero is sent in its place.
 Figures: ridgeback_control (twist_mux.yaml).
 """
@@ -33,7 +33,7 @@ STOCK_INPUTS = (
 
 
 class TwistMux:
-    """Decides, message by message, who may drive."""
+    """Decides for each message whether its input may drive."""
 
     def __init__(self, inputs: tuple[MuxInput, ...] = STOCK_INPUTS) -> None:
         self._inputs = {entry.topic: entry for entry in inputs}
@@ -41,7 +41,7 @@ class TwistMux:
         self.locked = False
 
     def passes(self, topic: str, now_ns: int) -> bool:
-        """Note a message on an input topic; tell whether it goes through to the wheels."""
+        """Record a message on an input topic; return whether it goes through to the wheels."""
         self._heard_ns[topic] = now_ns
         alive = [
             entry

@@ -1,10 +1,10 @@
-"""A websocket server inside an event loop, on the Sans-I/O connection of `wsproto`, with the bad habits of a real one.
+"""A websocket server inside an event loop, on the Sans-I/O connection of `wsproto`, with a real one's faults.
 
 Behaves as rosbridge's server does: any path, no subprotocol, no compression, an answer to every ping, an output
-buffer that grows while a client does not read. A connection that is reset takes what had not yet been worked on
-with it: the worker had one message in hand, the rest is dropped. One that is closed in order does not (a real
-server drops about half of it then; the worse case is taken here). Faults (frozen process, half-open link, a
-server that stops reading, a killed one) are switches here.
+buffer that grows while a client does not read. When a connection is reset, messages that were not yet processed
+are lost: the worker has one message in hand, the rest is dropped. When it is closed in order they are kept (a real
+server then drops about half of them; the worse case is modelled here). Faults (frozen process, half-open link, a
+server that stops reading, a killed one) can be switched on here.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.ipc.event_loop import READ, WRITE, EventLoop
 
 MAX_UNSENT_BYTES = 64 * 1024 * 1024
-"""A client that reads nothing is dropped here; the real server would go on until memory ends."""
+"""A client that leaves this much unread is dropped; the real server would continue until it runs out of memory."""
 _RECEIVE_BYTES = 65_536
 _MAX_BATCH_BYTES = 16 * 1024 * 1024
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)
@@ -45,12 +45,12 @@ class WebSocketPeer:
         self._broken = self._reset = False
         self.open = False
         self.silent = False
-        """Half-open: nothing goes out or comes in any more, and nobody is told."""
+        """Half-open: nothing is sent or received any more, without any error."""
         self.reading = True
         self.newest_inbound_ns = monotonic_ns()
 
     def send_text(self, text: str) -> None:
-        """Send one text message, or queue what the socket does not take."""
+        """Send one text message, and queue what the socket does not accept."""
         if self.open and not self.silent and self._websocket.state is ConnectionState.OPEN:
             self._write(self._websocket.send(TextMessage(data=text)))
 
@@ -60,7 +60,7 @@ class WebSocketPeer:
             self._write(self._websocket.send(Ping()))
 
     def watch(self, on: bool) -> None:
-        """Wait for the socket, or leave it alone."""
+        """Start or stop watching the socket."""
         loop = self._server.loop
         if self._socket is None:
             return
@@ -99,7 +99,7 @@ class WebSocketPeer:
             self.end()
 
     def _read(self) -> tuple[bytes, bool, bool]:
-        """Read all there is before anything is answered; return it, whether that was all, and whether by a reset."""
+        """Read all available bytes before answering; return them, whether the stream ended, and whether by a reset."""
         assert self._socket is not None
         data = bytearray()
         while len(data) < _MAX_BATCH_BYTES:
@@ -116,7 +116,7 @@ class WebSocketPeer:
         return bytes(data), False, False
 
     def _parse(self, data: bytes, texts: list[str]) -> bool:
-        """Append the texts in `data`, answer control frames; return whether the client said goodbye or nonsense."""
+        """Append the texts in `data`, answer control frames; return whether the client closed or broke the protocol."""
         try:
             if data:
                 self._websocket.receive_data(data)
@@ -125,7 +125,7 @@ class WebSocketPeer:
                 if self._closing:
                     return True
         except RemoteProtocolError as error:
-            if error.event_hint is not None and not self.open:  # no websocket handshake: answer HTTP 400
+            if error.event_hint is not None and not self.open:  # not a websocket handshake: answer HTTP 400
                 self._write(self._websocket.send(error.event_hint))
             return True
         except ProtocolError:
@@ -148,7 +148,7 @@ class WebSocketPeer:
             if self._websocket.state is ConnectionState.REMOTE_CLOSING:
                 self._write(self._websocket.send(event.response()))
             self._closing = True
-        elif not isinstance(event, (BytesMessage, Pong)):  # binary frames are not understood, pongs need nothing
+        elif not isinstance(event, (BytesMessage, Pong)):  # binary frames are ignored, pongs need no answer
             raise ProtocolError(f"unexpected {event}")
 
     def _write(self, data: bytes) -> None:
@@ -162,8 +162,8 @@ class WebSocketPeer:
         except BlockingIOError:
             pass
         except OSError as error:
-            # What came before is still worked on, and the reading side ends the connection. A reset is told once only:
-            # here, or there. (Writing to a client that closed in order gives EPIPE instead.)
+            # What arrived before is still processed, and the reading side ends the connection. A reset is reported only
+            # once: here or there. (Writing to a client that closed in order gives EPIPE instead.)
             self._broken = True
             self._reset = isinstance(error, ConnectionResetError)
             self._unsent.clear()
@@ -174,11 +174,11 @@ class WebSocketPeer:
 
 
 class WebSocketServer:
-    """Listens on `host`:`port` (0: any free one, kept over a restart) and calls back on open, text and close.
+    """Listens on `host`:`port` (0: any free one, kept across restarts) and calls back on open, text and close.
 
     `nagle`: leave the kernel's Nagle algorithm on, as autobahn 23.1 and later do by mistake. `ping_interval_s` and
     `ping_timeout_s` above 0: ping, and reset a client that has sent nothing for that long.
-    Raises UsageError for an address that others could reach, EnvironmentFault when the port cannot be bound.
+    Raises UsageError for an address that is not loopback, EnvironmentFault when the port cannot be bound.
     """
 
     def __init__(
@@ -200,7 +200,7 @@ class WebSocketServer:
         self.on_open, self.on_text, self._on_close = on_open, on_text, on_close
         self.host, self.port = host, port
         self.running = True
-        """False while the process is frozen."""
+        """Whether the process runs; False while it is frozen."""
         self.peers: list[WebSocketPeer] = []
         self._nagle = nagle
         self._ping_timeout_ns = int(ping_timeout_s * NS_PER_S)
@@ -209,7 +209,7 @@ class WebSocketServer:
         self._pinger = loop.call_every(int(ping_interval_s * NS_PER_S), self._ping_all) if ping_interval_s else None
 
     def listen(self) -> None:
-        """Start to accept clients; nothing when it does already."""
+        """Start accepting clients; no effect if already listening."""
         if self._listener is not None:
             return
         sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -230,13 +230,13 @@ class WebSocketServer:
         self.loop.add_fd(sock.fileno(), self._accept)
 
     def kill(self) -> None:
-        """Vanish as a killed process does: connections reset, nothing listens."""
+        """End as a killed process does: connections reset, nothing listens."""
         for peer in list(self.peers):
             peer.end(reset=True)
         self._stop_listening()
 
     def set_running(self, running: bool) -> None:
-        """Freeze (as SIGSTOP does: the kernel still takes what fits its buffers), or go on."""
+        """Freeze (as SIGSTOP does: the kernel still accepts what fits its buffers), or resume."""
         if running == self.running:
             return
         self.running = running
@@ -248,7 +248,7 @@ class WebSocketServer:
             peer.watch(running)
 
     def close(self) -> None:
-        """End everything; idempotent."""
+        """Close all connections and the port; idempotent."""
         if self._pinger is not None:
             self._pinger.cancel()
         for peer in list(self.peers):
@@ -256,7 +256,7 @@ class WebSocketServer:
         self._stop_listening()
 
     def forget(self, peer: WebSocketPeer, was_open: bool) -> None:
-        """Called by a peer that has ended."""
+        """Remove a peer that has ended; called by the peer."""
         self.peers.remove(peer)
         if was_open:
             self._on_close(peer)

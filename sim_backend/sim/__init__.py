@@ -1,1 +1,1 @@
-"""The three devices of level sim: drivers that ask the world directly."""
+"""The three devices of level sim: drivers that read the world directly."""

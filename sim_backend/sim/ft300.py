@@ -1,6 +1,6 @@
-"""The force-torque sensor of level `sim`: the driver contract over a virtual clock, without a byte.
+"""The force-torque sensor of level `sim`: the driver contract on a virtual clock, without a wire.
 
-Like a real one (an FT 300 unless told otherwise) it samples on its own grid, counts in steps, and delivers each
+Like a real one (by default an FT 300) it samples on its own time grid, quantises, and delivers each
 sample when its last byte would have been read. Not modelled: garbled packets, the adapter's bunching, opening and
 closing times.
 """
@@ -19,14 +19,14 @@ LINE_NS = 16 * NS_PER_S // 1920
 """16 bytes at 1920 bytes a second."""
 FT300_RESOLUTION: Vector6 = (0.01, 0.01, 0.01, 0.001, 0.001, 0.001)
 FT300_LIMIT: Vector6 = (327.67, 327.67, 327.67, 32.767, 32.767, 32.767)
-"""What an int16 in steps of the resolution can say."""
+"""The range of an int16 in steps of the resolution."""
 MAX_IN_FLIGHT = 512
 
 
 class SimFt300(DriverBase):
     """Samples `source` at (k + phase) / rate_hz of `clock` (ns) and delivers them one line time + latency later.
 
-    Drain it before other devices that share the world, so that each sample is asked for close to its own time.
+    Drain it before other devices that share the world, so that each sample is read close to its own time.
     """
 
     def __init__(
@@ -56,13 +56,13 @@ class SimFt300(DriverBase):
         self._overflow = 0
 
     def open(self) -> DeviceInfo:
-        """Identify; there is nothing to fail."""
+        """Identify the device; never fails."""
         self.close()
         self._state = LinkState.UP
         return DeviceInfo(device="ft300", where="sim", model="simulated FT 300")
 
     def start(self) -> None:
-        """Begin to sample at the next time of the grid. Raises DeviceNotReady when not open."""
+        """Start sampling at the next grid time. Raises DeviceNotReady when not open."""
         if self._state is not LinkState.UP:
             raise DeviceNotReady("it is not open", where="ft300 sim", do="Open it first")
         if self._streaming:
@@ -109,7 +109,7 @@ class SimFt300(DriverBase):
         return round((self._index + self._phase) * NS_PER_S / self._rate_hz)
 
     def _quantised(self, wrench: Vector6) -> SensorWrench:
-        """Return the wrench (N, N*m) in whole steps of the resolution, clipped at the limit of each axis."""
+        """Return the wrench (N, N*m) in integer steps of the resolution, clipped at the limit of each axis."""
         fx, fy, fz, mx, my, mz = map(_rounded, wrench, self._steps_per_unit, self._limit)
         return SensorWrench(fx, fy, fz, mx, my, mz)
 

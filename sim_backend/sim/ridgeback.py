@@ -1,7 +1,7 @@
-"""The Ridgeback in process, for level `sim`: the driver's contract on a virtual clock, no wire.
+"""The Ridgeback of level `sim`, in process: the driver contract on a virtual clock, without a wire.
 
-Samples appear at their rates and phases, each read from the world at its own time, oldest first; a pose of
-motion capture arrives `mocap_latency_s` after it was. A command arrives at the moment it is given.
+Samples appear at their rates and phases, each read from the world at its own time, oldest first; a pose from
+motion capture arrives `mocap_latency_s` after it was measured. A command arrives at the moment it is given.
 Not modelled: the bridge (its delays, silences and faults), the multiplexer, battery and stop changes.
 """
 
@@ -40,7 +40,7 @@ _STATUS_PHASE = 0.01
 
 
 class _Feed:
-    """A grid of sample times; what is sampled at t arrives `latency_ns` later."""
+    """A grid of sample times; a sample taken at t arrives `latency_ns` later."""
 
     def __init__(self, start_ns: int, rate_hz: float, phase: float, latency_ns: int = 0) -> None:
         self.period_ns = round(NS_PER_S / rate_hz)
@@ -49,7 +49,7 @@ class _Feed:
 
 
 class SimRidgeback(DriverBase):
-    """A base made of a `BaseSource`: `clock` is the virtual clock, `settings` give rates, phases and latency."""
+    """A base on top of a `BaseSource`: `clock` is the virtual clock, `settings` give rates, phases and latency."""
 
     def __init__(
         self,
@@ -73,12 +73,12 @@ class SimRidgeback(DriverBase):
         self.sent_ns = 0
 
     def open(self) -> DeviceInfo:
-        """Nothing to connect to."""
+        """Return the device's identity; there is nothing to connect to."""
         self._state = LinkState.OPENING
         return DeviceInfo("ridgeback", "simulated", "Ridgeback")
 
     def start(self) -> None:
-        """Let the feeds run from now on. Raises DeviceNotReady when not open."""
+        """Start the feeds now. Raises DeviceNotReady when not open."""
         if self._state is LinkState.CLOSED:
             raise DeviceNotReady("it is not open", where="ridgeback sim", do="Open it first")
         now_ns = self._clock()
@@ -101,7 +101,7 @@ class SimRidgeback(DriverBase):
         if self._state != LinkState.UP:
             return ()
         self.newest_pong_ns = now_ns
-        # The world only goes forward: sample everything in time order, and let it arrive when its latency is over.
+        # The world only advances: sample everything in time order, and deliver it after its latency.
         while self._feeds:
             kind = min(self._feeds, key=lambda name: self._feeds[name].next_ns)
             feed = self._feeds[kind]
@@ -117,7 +117,7 @@ class SimRidgeback(DriverBase):
         return tuple(arrived)
 
     def command(self, wanted: BodyTwist) -> BodyTwist:
-        """Give the wheels a velocity (BODY frame). Raises ValueError unless finite."""
+        """Send the wheels a velocity (BODY frame). Raises ValueError unless finite."""
         if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):
             raise ValueError(f"a velocity must be finite, got {wanted}")
         if self._state != LinkState.UP:
@@ -137,7 +137,7 @@ class SimRidgeback(DriverBase):
         self.command(BodyTwist())
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing: there is nothing to release."""
         self._state = LinkState.CLOSED
 
     def _sample(self, kind: str, t_ns: int, arrival_ns: int) -> list[Stamped[BaseFeed]]:

@@ -15,7 +15,7 @@ _CYCLE_S = 0.008
 
 
 class SimUr10(DriverBase):
-    """A UR10 held still, sampled on its own grid: `rate_hz` and `phase` (0..1 of a period) against `clock` (ns)."""
+    """A UR10 held still, sampled on a grid of its own: `rate_hz` and `phase` (0..1 of a period) against `clock` (ns)."""
 
     def __init__(self, source: ArmSource, clock: ClockNs, *, rate_hz: float = 124.99, phase: float = 0.21) -> None:
         self._source = source
@@ -28,7 +28,7 @@ class SimUr10(DriverBase):
         self._drained = 0
 
     def open(self) -> DeviceInfo:
-        """Identify; the grid starts here."""
+        """Identify the device and start the time grid."""
         self._start_ns = self._clock()
         self._record = NO_ARM
         self._drained = 0
@@ -36,7 +36,7 @@ class SimUr10(DriverBase):
         return DeviceInfo("ur10", "sim", "UR10", "simulated")
 
     def start(self) -> None:
-        """Begin the flow. Raises DeviceNotReady when not open."""
+        """Start the flow of data. Raises DeviceNotReady when not open."""
         if self._state is LinkState.CLOSED:
             raise DeviceNotReady("it is not open", where="ur10 sim", do="Open it first")
         self._state = LinkState.UP
@@ -50,7 +50,7 @@ class SimUr10(DriverBase):
         return self._record if self._record.packets else None
 
     def drain(self) -> tuple[Stamped[JointState], ...]:
-        """Return the newest state when there is one since the last call (joints in rad), else nothing."""
+        """Return the newest state if it is new since the last call (joints in rad), else nothing."""
         record = self.read()
         if self._state != LinkState.UP or record is None or record.packets == self._drained:
             return ()
@@ -62,7 +62,7 @@ class SimUr10(DriverBase):
         return DeviceHealth(self._state, "", {"packets": self._record.packets}, NS_PER_S / self._period_ns)
 
     def stop(self) -> None:
-        """End the flow; nothing is ever commanded."""
+        """Stop the flow of data; nothing is ever commanded."""
         self._state = LinkState.CLOSED
 
     def close(self) -> None:

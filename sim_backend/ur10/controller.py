@@ -1,7 +1,7 @@
 """The emulated controller (CB3): power, safety, program, registers and joints, one 8 ms cycle at a time.
 
-It knows no socket. Simplified: power steps take a fixed time; a protective stop pauses the running program and
-unlocking leaves it paused; an emergency stop ends the program and takes the power away.
+It has no sockets. Simplified: power steps take a fixed time; a protective stop pauses the running program and
+unlocking leaves it paused; an emergency stop ends the program and switches the power off.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sim_backend.world.plant import ArmSource
 PROGRAM_START_NS = 50 * NS_PER_MS
 UNLOCK_AFTER_NS = 5 * NS_PER_S
 START_TIME_S = 1000.0
-"""What the controller's own clock shows when the emulator starts."""
+"""The controller's own clock when the emulator starts."""
 
 Version = tuple[int, int, int, int]
 
@@ -55,12 +55,12 @@ class UrController:
 
     @property
     def time_s(self) -> float:
-        """The controller's own clock, s: one cycle is always 8 ms to it."""
+        """The controller's own clock, s: it advances by exactly 8 ms per cycle."""
         return START_TIME_S + self.counters["cycles"] * CYCLE_S + self.time_jump_s
 
     @property
     def reported_q(self) -> Joints:
-        """Joints as reported (rad), with what the fault injector broke."""
+        """Joints as reported (rad), with injected faults."""
         if not self.nan_joints:
             return self.motion.actual
         a, b, c, d, e, f = (math.nan if i in self.nan_joints else q for i, q in enumerate(self.motion.actual))
@@ -84,7 +84,7 @@ class UrController:
         self.motion.step(self._source.read_arm(now_ns), CYCLE_S)
 
     def upload(self, text: str) -> None:
-        """Take a program from a script port; it replaces a running one. Refused without a word when not ready."""
+        """Accept a program from a script port; it replaces a running one. Ignored silently when not ready."""
         if self.ignore_scripts or not self.ready:
             self.counters["scripts_refused"] += 1
             return
@@ -96,13 +96,13 @@ class UrController:
         return self.robot_mode == RobotMode.RUNNING and self.safety_mode in MAY_MOVE
 
     def start_program(self, program: Program) -> None:
-        """Stop what runs and start `program` a moment later."""
+        """Stop the running program and start `program` a moment later."""
         self.stop_program()
         self._waiting = (self._now_ns + PROGRAM_START_NS, program)
 
     def _begin_program(self, program: Program) -> None:
         self._waiting = None
-        if not self.ready:  # it was when the program came
+        if not self.ready:  # it was ready when the program arrived
             self.counters["scripts_refused"] += 1
             return
         self.program = program
@@ -110,7 +110,7 @@ class UrController:
         self.counters["programs_started"] += 1
 
     def play_other_program(self, name: str = "other") -> None:
-        """Run a program that is not ours, as from the pendant."""
+        """Run another program, as from the pendant."""
         self.start_program(OtherProgram(name))
 
     def stop_program(self) -> None:
@@ -128,23 +128,23 @@ class UrController:
             self.motion.hold()
 
     def resume_program(self) -> None:
-        """Go on with a paused program."""
+        """Resume a paused program."""
         if self.runtime_state == RuntimeState.PAUSED and self.ready:
             self.runtime_state = RuntimeState.PLAYING
 
     def power_on(self) -> None:
-        """Power to the arm; brakes stay on (IDLE) a moment later."""
+        """Power on the arm; a moment later it is IDLE, brakes still on."""
         if self.robot_mode == RobotMode.POWER_OFF and self.safety_mode in MAY_MOVE:
             self.robot_mode = RobotMode.BOOTING
             self._power_at = (self._now_ns + self._power_step_ns, RobotMode.IDLE)
 
     def release_brakes(self) -> None:
-        """From IDLE to RUNNING a moment later."""
+        """Release the brakes: from IDLE to RUNNING a moment later."""
         if self.robot_mode == RobotMode.IDLE:
             self._power_at = (self._now_ns + self._power_step_ns, RobotMode.RUNNING)
 
     def power_off(self) -> None:
-        """Brakes on and power away, at once."""
+        """Engage the brakes and switch the power off, at once."""
         self.stop_program()
         self._power_at = None
         self.robot_mode = RobotMode.POWER_OFF
@@ -156,17 +156,17 @@ class UrController:
         self._stopped_ns = self._now_ns
 
     def trip_safeguard_stop(self) -> None:
-        """Stop as by an opened fence; the program is paused."""
+        """Stop as for an opened safety fence; the program is paused."""
         self.pause_program()
         self.safety_mode = SafetyMode.SAFEGUARD_STOP
 
     def trip_emergency_stop(self) -> None:
-        """The red button: power away, program ended."""
+        """Stop as by the red button: power off, program ended."""
         self.power_off()
         self.safety_mode = SafetyMode.ROBOT_EMERGENCY_STOP
 
     def unlock_protective_stop(self) -> bool:
-        """Unlock; False within 5 s of the stop. The program stays paused."""
+        """Unlock; return False within 5 s of the stop. The program stays paused."""
         if self.safety_mode == SafetyMode.PROTECTIVE_STOP:
             if self._now_ns - self._stopped_ns < UNLOCK_AFTER_NS:
                 return False
@@ -174,5 +174,5 @@ class UrController:
         return True
 
     def clear_stop(self) -> None:
-        """Back to normal safety mode whatever it was; power and program stay as they are."""
+        """Return to safety mode NORMAL from any other; power and program are unchanged."""
         self.safety_mode = SafetyMode.NORMAL

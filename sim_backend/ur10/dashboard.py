@@ -1,4 +1,4 @@
-"""The dashboard server of the emulated controller (port 29999): one command a line, one reply a line.
+"""The dashboard server of the emulated controller (port 29999): one command and one reply per line.
 
 Source: Universal Robots dashboard server manual, CB3.
 """
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode
-from sim_backend.ur10.seen import Seen
+from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.tcp import TcpClient, TcpServer
 
 DASHBOARD_PORT = 29999
@@ -154,7 +154,7 @@ class DashboardClient(TcpClient):
         for raw in lines:
             line = raw.decode("utf-8", "replace").strip()
             if line and self.open:
-                self._dashboard_server.seen.dashboard_lines.append(line)
+                self._dashboard_server.requests.dashboard_lines.append(line)
                 reply = self._dashboard_server.dashboard.answer(line)
                 self._say(reply)
                 if line.lower() == "quit":
@@ -168,8 +168,8 @@ class DashboardClient(TcpClient):
 class DashboardServer(TcpServer):
     """The dashboard port."""
 
-    def __init__(self, loop: EventLoop, host: str, dashboard: Dashboard, seen: Seen) -> None:
+    def __init__(self, loop: EventLoop, host: str, dashboard: Dashboard, requests: RequestLog) -> None:
         self.dashboard = dashboard
-        self.seen = seen
+        self.requests = requests
         self.muted = False
         super().__init__(loop, host, DASHBOARD_PORT, lambda _server, sock: DashboardClient(self, sock))

@@ -1,7 +1,7 @@
 """A UR10 controller (CB3, PolyScope 3.15) on the wire: RTDE, script upload and dashboard on one loopback address.
 
-One thread, one event loop, shared with whatever else runs in it. The joints come from the world; what a program
-or a fault moves is added to them (`motion`) and does not go back into the world.
+One thread, one event loop, shared with whatever else runs in it. The joints come from the world; motion by a program
+or a fault is added to them (`motion`) and does not feed back into the world.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from robot_io.ipc.event_loop import EventLoop, Timer
 from sim_backend.ur10.controller import UrController, Version
 from sim_backend.ur10.dashboard import Dashboard, DashboardServer
 from sim_backend.ur10.faults import UrFaults
+from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.script_server import script_servers
-from sim_backend.ur10.seen import Seen
 from sim_backend.ur10.tcp import TcpServer
 from sim_backend.world.plant import ArmSource
 
@@ -24,8 +24,8 @@ RESYNC_AFTER_NS = NS_PER_S
 class UrEmulator(UrFaults):
     """An emulated UR10 at `host` (127.x.y.z), serving as soon as its loop runs.
 
-    `rate_hz` is the control cycle as a clock outside sees it (a real one is never exactly 125 Hz); `phase`
-    (0..1) shifts its grid. The fault methods are those of `UrFaults`; `seen` and `counters` tell what happened.
+    `rate_hz` is the control cycle measured by an outside clock (a real one is never exactly 125 Hz); `phase`
+    (0..1) shifts its grid. The fault methods are those of `UrFaults`; `requests` and `counters` record what happened.
     Raises EnvironmentFault when a port is taken, UsageError for an address that is not loopback.
     """
 
@@ -44,7 +44,7 @@ class UrEmulator(UrFaults):
         power_step_s: float = 1.0,
     ) -> None:
         self.host = host
-        self.seen = Seen()
+        self.requests = RequestLog()
         self.controller = UrController(source, version, monotonic_ns(), power_step_s)
         self._loop = loop
         self._period_ns = NS_PER_S / rate_hz
@@ -55,11 +55,13 @@ class UrEmulator(UrFaults):
         self.resyncs = 0
         opened: list[TcpServer] = []
         try:
-            self.rtde = RtdeServer(loop, host, self.controller, self.seen)
+            self.rtde = RtdeServer(loop, host, self.controller, self.requests)
             opened.append(self.rtde)
-            self.dashboard = DashboardServer(loop, host, Dashboard(self.controller, model, serial, programs), self.seen)
+            self.dashboard = DashboardServer(
+                loop, host, Dashboard(self.controller, model, serial, programs), self.requests
+            )
             opened.append(self.dashboard)
-            self.scripts = script_servers(loop, host, self.controller, self.seen)
+            self.scripts = script_servers(loop, host, self.controller, self.requests)
         except BaseException:
             for server in opened:
                 server.close()
@@ -76,8 +78,8 @@ class UrEmulator(UrFaults):
             "rtde_accepted": self.rtde.accepted,
             "dashboard_accepted": self.dashboard.accepted,
             "script_accepted": sum(server.accepted for server in self.scripts),
-            "input_frames": self.seen.input_frames,
-            "bad_frames": self.seen.bad_frames,
+            "input_frames": self.requests.input_frames,
+            "bad_frames": self.requests.bad_frames,
             "late_cycles": self.late_cycles,
             "resyncs": self.resyncs,
         }
@@ -99,7 +101,7 @@ class UrEmulator(UrFaults):
         late_ns = monotonic_ns() - grid_ns
         if late_ns > self._period_ns:
             self.late_cycles += 1
-            self.rtde.read_now()  # a stall of this process must not look like silence of the clients
+            self.rtde.read_now()  # a stall of this process must not be mistaken for silence of the clients
         if late_ns > RESYNC_AFTER_NS:
             self.resyncs += 1
             self._cycle += int(late_ns / self._period_ns)

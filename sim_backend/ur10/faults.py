@@ -1,4 +1,4 @@
-"""The faults an emulated UR10 can be given: every method acts at once and returns at once."""
+"""Fault injection for an emulated UR10: every method acts and returns at once."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ class UrFaults:
         self.controller.trip_protective_stop()
 
     def safeguard_stop(self) -> None:
-        """Stop as by an opened fence; a program is paused."""
+        """Stop as for an opened safety fence; a program is paused."""
         self.controller.trip_safeguard_stop()
 
     def emergency_stop(self) -> None:
-        """The red button: power off."""
+        """Stop as by the red button: power off."""
         self.controller.trip_emergency_stop()
 
     def clear_stop(self) -> None:
-        """Back to safety mode NORMAL; power and program stay as they are."""
+        """Return to safety mode NORMAL; power and program are unchanged."""
         self.controller.clear_stop()
 
     def resume_program(self) -> None:
-        """Somebody presses play on a paused program."""
+        """Resume a paused program, as from the pendant."""
         self.controller.resume_program()
 
     def power_off(self) -> None:
@@ -58,7 +58,7 @@ class UrFaults:
         self.controller.teach_button = pressed
 
     def play_other_program(self, name: str = "other") -> None:
-        """Start a program that is not ours, as from the pendant."""
+        """Start another program, as from the pendant."""
         self.controller.play_other_program(name)
 
     def pause_program(self) -> None:
@@ -70,7 +70,7 @@ class UrFaults:
         self.controller.stop_program()
 
     def ignore_scripts(self, on: bool = True) -> None:
-        """Swallow uploaded programs."""
+        """Ignore uploaded programs."""
         self.controller.ignore_scripts = on
 
     def drift_step(self, joints_rad: Sequence[float]) -> None:
@@ -80,7 +80,7 @@ class UrFaults:
         ]
 
     def drift_rate(self, joints_rad_per_s: Sequence[float]) -> None:
-        """Let the joints creep at six rates (rad/s); zeros end it."""
+        """Let the joints drift at six rates (rad/s); zeros end it."""
         if len(joints_rad_per_s) != 6:
             raise ValueError("six rates, one per joint")
         self.controller.motion.drift_rate = list(joints_rad_per_s)
@@ -90,29 +90,29 @@ class UrFaults:
         (self.controller.nan_joints.add if on else self.controller.nan_joints.discard)(joint)
 
     def jump_time(self, seconds: float) -> None:
-        """Let the controller's time stamp jump, back if negative."""
+        """Make the controller's time stamp jump, backwards if negative."""
         self.controller.time_jump_s += seconds
 
     def mute(self, on: bool = True) -> None:
-        """Answer RTDE requests and send no data."""
+        """Answer RTDE requests but send no data."""
         self.rtde.muted = on
 
     def mute_dashboard(self, on: bool = True) -> None:
-        """Accept dashboard connections and say nothing."""
+        """Accept dashboard connections but send nothing."""
         self.dashboard.muted = on
 
     def freeze(self, on: bool = True) -> None:
-        """Like SIGSTOP of the controller: the kernel accepts, nobody answers or reads."""
+        """Freeze the controller as SIGSTOP does: the kernel accepts connections, nothing is read or answered."""
         for server in self._servers():
             server.freeze(on)
 
     def drop_data(self, frames: int) -> None:
-        """Leave out the next data frames."""
+        """Drop the next data frames."""
         for client in self.rtde.rtde_clients:
             client.skip_frames += frames
 
     def truncate_data(self, values_bytes: int) -> None:
-        """Cut the values of the next data frame; its header fits the cut frame."""
+        """Cut the values of the next data frame; its header matches the shortened frame."""
         for client in self.rtde.rtde_clients:
             client.cut_frame_to = values_bytes
 

@@ -1,7 +1,7 @@
-"""The RTDE variables of a CB3 controller: name, type on the wire, and where the emulator takes or puts the value.
+"""The RTDE variables of a CB3 controller: name, type on the wire, and how the emulator reads or writes the value.
 
 Source: Universal Robots RTDE guide. Clients decode by their own table, so the types must be the documented ones.
-Quantities the emulator has no model for are constants of a healthy robot at rest.
+Quantities that are not modelled are constants of a healthy robot at rest.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ _OUTPUTS: dict[str, Output] = {
 
 
 def _discard(_robot: UrController, _values: Values, _now_ns: int) -> None:
-    """Accepted, and without effect on this robot."""
+    """Accept and ignore a value that has no effect on this robot."""
 
 
 def _set_wrench(robot: UrController, values: Values, _now_ns: int) -> None:
@@ -191,7 +191,7 @@ def _add_registers(i: int) -> None:
 
 
 def _add_bits(name: str, type_name: str, first: int, count: int) -> None:
-    """Input bits first..first+count-1 as one number."""
+    """Add the input bits first..first+count-1 as one number."""
 
     def write(robot: UrController, values: Values, _now_ns: int) -> None:
         robot.registers.bits_in[first : first + count] = [bool(int(values[0]) >> i & 1) for i in range(count)]

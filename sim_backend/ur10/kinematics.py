@@ -1,6 +1,6 @@
 """Flange pose of a UR10 from its joints (Denavit-Hartenberg parameters published by Universal Robots).
 
-A real arm carries its own calibration, millimetres off these.
+A real arm has its own calibration, which differs from these by millimetres.
 """
 
 from __future__ import annotations

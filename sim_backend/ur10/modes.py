@@ -9,7 +9,7 @@ from enum import IntEnum
 
 
 class RobotMode(IntEnum):
-    """Output `robot_mode`; the dashboard says the same by name."""
+    """Output `robot_mode`; the dashboard reports the same by name."""
 
     NO_CONTROLLER = -1
     DISCONNECTED = 0
@@ -23,7 +23,7 @@ class RobotMode(IntEnum):
 
 
 class SafetyMode(IntEnum):
-    """Output `safety_mode`; the dashboard says the same by name."""
+    """Output `safety_mode`; the dashboard reports the same by name."""
 
     NORMAL = 1
     REDUCED = 2

@@ -1,4 +1,4 @@
-"""How the emulated arm moves: the joints of the world, plus what drifted, plus what a program commanded.
+"""How the emulated arm moves: the world's joints, plus drift, plus the motion commanded by a program.
 
 Not modelled: joint dynamics, Cartesian motion (moveL, speedL), collisions. A servo target is followed with
 first-order lag, a joint move runs at constant speed along the straight line in joint space.
@@ -15,21 +15,21 @@ from sim_backend.world.plant import ArmTruth
 SERVO_LAG_S = 0.03
 STEADY_RAD_PER_S = 0.001
 JOINT_RANGE_RAD = 2.0 * math.pi
-"""Either way, as on the real arm."""
+"""In either direction, as on the real arm."""
 
 
 class ArmMotion:
-    """Joint angles (rad) after each controller cycle; `offset` is where the arm has gone from the world's joints."""
+    """Joint angles (rad) after each controller cycle; `offset` is the arm's deviation from the world's joints."""
 
     def __init__(self) -> None:
         self.offset = [0.0] * 6
         self.drift_rate = [0.0] * 6
-        """Creep of each joint (rad/s), for fault injection."""
+        """Drift of each joint (rad/s), for fault injection."""
         self.actual: Joints = (0.0,) * 6
         self.velocity: Joints = (0.0,) * 6
         self.target: Joints = (0.0,) * 6
         self.moving = False
-        """A joint move is under way."""
+        """Whether a joint move is in progress."""
         self._advance: Callable[[Joints, float], Sequence[float]] | None = None
 
     @property
@@ -38,12 +38,12 @@ class ArmMotion:
         return all(abs(v) < STEADY_RAD_PER_S for v in self.velocity)
 
     def hold(self) -> None:
-        """Stay where the arm is."""
+        """Hold the current position."""
         self._advance = None
         self.moving = False
 
     def servo(self, target: Joints) -> None:
-        """Follow `target` until told otherwise."""
+        """Follow `target` until the next command."""
         target = _joints([_in_range(q) for q in target])
 
         def follow(base: Joints, dt_s: float) -> Sequence[float]:
@@ -54,7 +54,7 @@ class ArmMotion:
         self._advance = follow
 
     def speed(self, rates: Joints) -> None:
-        """Turn each joint at the given rate (rad/s) until told otherwise."""
+        """Turn each joint at the given rate (rad/s) until the next command."""
         self.moving = False
         self._advance = lambda _base, dt_s: [rate * dt_s for rate in rates]
 
@@ -75,7 +75,7 @@ class ArmMotion:
         self._advance = straight
 
     def step(self, base: ArmTruth, dt_s: float) -> None:
-        """Go one controller cycle further."""
+        """Advance by one controller cycle."""
         commanded = self._advance(base.position, dt_s) if self._advance is not None else (0.0,) * 6
         rates = []
         for i in range(6):

@@ -1,9 +1,9 @@
-"""What can run on the emulated controller: another program, or ur_rtde's control script as a register machine.
+"""The programs of the emulated controller: another program, or ur_rtde's control script as a register machine.
 
-URScript is not interpreted. ur_rtde's script is known by its header and replaced by the protocol it keeps on the
+URScript is not interpreted. ur_rtde's script is recognised by its header and replaced by its protocol on the
 registers (register numbers below are relative to its offset, 0 or 24): input integer 0 holds the command, output
-integer 0 says 1 (ready) or 2 (done). A command without a model is only `done`: a question among them (joint
-torques, inverse kinematics) finds in the output registers what the last answer left there.
+integer 0 is 1 (ready) or 2 (done). A command that is not modelled is only `done`: a query among them (joint
+torques, inverse kinematics) reads what the last answer left in the output registers.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ FORWARD_KINEMATICS = 43
 IS_STEADY = 47
 STOP_SCRIPT = 255
 REALTIME = frozenset({6, SPEED_J, 10, SERVO_J, 24, 25, GET_STEP_TIME, GET_JOINT_HISTORY, 38, 58, *range(66, 72)})
-"""Commands carried out every cycle while they stand in the register; all others once, until a 0 is seen."""
+"""Commands executed every cycle while they are in the register; all others once, until the register is 0."""
 
 CYCLE_S = 0.008
 
 
 class Robot(Protocol):
-    """What a program can touch of the controller."""
+    """The part of the controller that a program can access."""
 
     registers: Registers
     motion: ArmMotion
@@ -68,12 +68,12 @@ class Program(Protocol):
     name: str
 
     def step(self, robot: Robot, now_ns: int) -> bool:
-        """Run one cycle; False when the program has ended."""
+        """Run one cycle; return False when the program has ended."""
         ...
 
 
 class OtherProgram:
-    """Any program but ur_rtde's: it plays, does not move, and ends after `cycles` (0: when stopped)."""
+    """Any program other than ur_rtde's: it runs, does not move, and ends after `cycles` (0: when stopped)."""
 
     def __init__(self, name: str, cycles: int = 0) -> None:
         self.name = name
@@ -172,7 +172,7 @@ class ControlScript:
 
 
 def program_of(text: str) -> Program:
-    """Return what an uploaded script text runs as."""
+    """Return the program for an uploaded script text."""
     if CONTROL_SCRIPT_MARK in text:
         return ControlScript(text)
     name = re.match(r"\s*def\s+(\w+)", text)

@@ -24,7 +24,7 @@ class Registers:
         self.int_written_ns = [0] * REGISTERS
 
     def write_int(self, index: int, value: int, now_ns: int) -> None:
-        """A client wrote `input_int_register_<index>`."""
+        """Store a client's value of `input_int_register_<index>`."""
         self.int_in[index] = value
         self.int_written_ns[index] = now_ns
 
@@ -39,6 +39,6 @@ class Watchdog:
         self._since_ns = now_ns
 
     def tripped(self, now_ns: int) -> bool:
-        """Return whether the register was left alone for too long."""
+        """Return whether the register was not written for too long."""
         last_ns = max(self._since_ns, self._registers.int_written_ns[self._index])
         return now_ns - last_ns > self._limit_ns

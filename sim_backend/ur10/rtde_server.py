@@ -1,6 +1,6 @@
 """RTDE on the emulated controller (port 30004), protocol versions 1 and 2. Source: Universal Robots RTDE guide.
 
-frame: uint16 length (with these 3 bytes) | uint8 type | payload, all big-endian
+frame: uint16 length (including these 3 bytes) | uint8 type | payload, all big-endian
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from robot_io.clock import monotonic_ns
 from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.fields import WIRE_FORMAT, Input, Output, Values, input_field, output_field
-from sim_backend.ur10.seen import Seen
+from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.tcp import TcpClient, TcpServer
 
 RTDE_PORT = 30004
@@ -26,14 +26,14 @@ _INFO_LEVEL = 3
 
 
 class OutputRecipe:
-    """What a client wants to read, in its order."""
+    """The variables that a client reads, in its order."""
 
     def __init__(self, fields: list[Output]) -> None:
         self._fields = fields
         self._layout = struct.Struct(">" + "".join(WIRE_FORMAT[field.type] for field in fields))
 
     def pack(self, robot: UrController) -> bytes:
-        """Return the values of this moment."""
+        """Return the current values."""
         values: list[float] = []
         for field in self._fields:
             values.extend(field.read(robot))
@@ -41,7 +41,7 @@ class OutputRecipe:
 
 
 class InputRecipe:
-    """What a client wants to write, in its order."""
+    """The variables that a client writes, in its order."""
 
     def __init__(self, fields: list[Input]) -> None:
         self._fields = fields
@@ -49,7 +49,7 @@ class InputRecipe:
         self.size = sum(layout.size for layout in self._layouts)
 
     def write(self, robot: UrController, data: bytes, now_ns: int) -> None:
-        """Put the values into the controller."""
+        """Write the values to the controller."""
         at = 0
         for field, layout in zip(self._fields, self._layouts, strict=True):
             values: Values = layout.unpack_from(data, at)
@@ -79,7 +79,7 @@ class RtdeClient(TcpClient):
         while self.open and len(self._pending) >= _HEADER.size:
             length, kind = _HEADER.unpack_from(self._pending)
             if length < _HEADER.size:
-                self.rtde.seen.bad_frames += 1
+                self.rtde.requests.bad_frames += 1
                 self.close()
                 return
             if len(self._pending) < length:
@@ -89,7 +89,7 @@ class RtdeClient(TcpClient):
             self._on_frame(chr(kind), body)
 
     def on_closed(self) -> None:
-        """Give back the inputs; their values stay."""
+        """Release the inputs; their values are kept."""
         self.rtde.owners = {name: owner for name, owner in self.rtde.owners.items() if owner is not self}
 
     def reply(self, kind: str, body: bytes) -> None:
@@ -105,7 +105,7 @@ class RtdeClient(TcpClient):
             self.reply("M", bytes([len(message)]) + message + bytes([len(origin)]) + origin + bytes([level]))
 
     def send_data(self) -> None:
-        """Send one data frame when this client's rate asks for one in this cycle."""
+        """Send one data frame if this client's rate requires one in this cycle."""
         if not self.started or self.output is None:
             return
         self._due += self.frequency_hz / CYCLE_HZ
@@ -126,7 +126,7 @@ class RtdeClient(TcpClient):
 
     def _on_frame(self, kind: str, body: bytes) -> None:
         if kind != "U":
-            self.rtde.seen.handshake.append(f"{kind} {body[:60]!r}")
+            self.rtde.requests.handshake.append(f"{kind} {body[:60]!r}")
         handler = {
             "V": self._on_protocol,
             "v": self._on_version,
@@ -138,7 +138,7 @@ class RtdeClient(TcpClient):
             "M": self._on_text,
         }.get(kind)
         if handler is None:
-            self.rtde.seen.bad_frames += 1
+            self.rtde.requests.bad_frames += 1
         else:
             handler(body)
 
@@ -155,7 +155,7 @@ class RtdeClient(TcpClient):
         frequency_hz = CYCLE_HZ
         if self.version == 2:
             if len(body) < 8:
-                self.rtde.seen.bad_frames += 1
+                self.rtde.requests.bad_frames += 1
                 return
             (frequency_hz,) = struct.unpack_from(">d", body)
             body = body[8:]
@@ -167,11 +167,11 @@ class RtdeClient(TcpClient):
         if complete:
             self.output = OutputRecipe(found)
             self.frequency_hz = min(max(frequency_hz, 1.0), CYCLE_HZ) if math.isfinite(frequency_hz) else CYCLE_HZ
-            self._due = 1.0 - self.frequency_hz / CYCLE_HZ  # the first frame leaves with the first cycle
+            self._due = 1.0 - self.frequency_hz / CYCLE_HZ  # the first frame is sent in the first cycle
         self.reply("O", (bytes([complete]) if self.version == 2 else b"") + types.encode())
 
     def _on_inputs(self, body: bytes) -> None:
-        self.rtde.seen.input_setups += 1
+        self.rtde.requests.input_setups += 1
         owners = self.rtde.owners
         names = _names(body)
         types: list[str] = []
@@ -201,24 +201,24 @@ class RtdeClient(TcpClient):
         self.reply("P", b"\x01")
 
     def _on_data(self, body: bytes) -> None:
-        seen = self.rtde.seen
-        seen.input_frames += 1
+        requests = self.rtde.requests
+        requests.input_frames += 1
         number = body[0] if body else 0
         if not 1 <= number <= len(self.inputs) or len(body) != 1 + self.inputs[number - 1].size:
-            seen.bad_frames += 1
+            requests.bad_frames += 1
             return
         self.inputs[number - 1].write(self.rtde.robot, body[1:], monotonic_ns())
 
     def _on_text(self, body: bytes) -> None:
-        """A text message of a client goes to the robot's log; nothing is answered."""
+        """Ignore a client's text message: it only goes to the robot's log."""
 
 
 class RtdeServer(TcpServer):
-    """The RTDE port: clients, who owns which input, and the data of each cycle."""
+    """The RTDE port: clients, the owner of each input, and the data of each cycle."""
 
-    def __init__(self, loop: EventLoop, host: str, robot: UrController, seen: Seen) -> None:
+    def __init__(self, loop: EventLoop, host: str, robot: UrController, requests: RequestLog) -> None:
         self.robot = robot
-        self.seen = seen
+        self.requests = requests
         self.owners: dict[str, RtdeClient] = {}
         self.muted = False
         self.counters = {"data_sent": 0, "data_dropped": 0}
@@ -233,7 +233,7 @@ class RtdeServer(TcpServer):
                 client.send_data()
 
     def read_now(self) -> None:
-        """Take what clients have already sent, before a late cycle judges by it."""
+        """Read what clients have already sent, before a late cycle acts on it."""
         for client in tuple(self.rtde_clients):
             client.read_now()
 
@@ -244,5 +244,5 @@ class RtdeServer(TcpServer):
 
 
 def _names(body: bytes) -> list[str]:
-    """Names of a comma list; ur_rtde ends its lists with a comma."""
+    """Return the names in a comma-separated list; ur_rtde ends its lists with a comma."""
     return [name.strip() for name in body.decode("ascii", "replace").split(",") if name.strip()]

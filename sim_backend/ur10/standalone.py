@@ -1,4 +1,4 @@
-"""An arm that stands still, for a UR10 emulator that runs without a world."""
+"""An arm at rest, for a UR10 emulator that runs without a world."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Listening and talking on one TCP port of the emulated controller without ever blocking."""
+"""Non-blocking server and client connections for one TCP port of the emulated controller."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.ipc.event_loop import HANGUP, READ, WRITE, EventLoop
 
 _READ_BYTES = 4096
-"""Little at a time: a client that floods its connection with requests must not keep the others waiting."""
+"""Small, so that a client that floods its connection with requests does not keep the others waiting."""
 _QUEUE_LIMIT_BYTES = 4_000_000
 """A client that leaves this much unread is dropped."""
 
 _SEND_BUFFER_BYTES = 65536
-"""Keeps what a slow client has not read short, so that dropping begins soon."""
+"""Small, so that little is buffered for a slow client and dropping starts early."""
 
 
 class TcpClient(ABC):
@@ -33,18 +33,18 @@ class TcpClient(ABC):
 
     @property
     def queued_bytes(self) -> int:
-        """How many bytes the client has not taken yet."""
+        """Number of bytes that the client has not accepted yet."""
         return len(self._queue)
 
     @abstractmethod
     def on_bytes(self, data: bytes) -> None:
-        """Bytes came in."""
+        """Process received bytes."""
 
-    def on_closed(self) -> None:  # noqa: B027 - most have nothing to let go of
-        """The connection is gone; called once."""
+    def on_closed(self) -> None:  # noqa: B027 - most have nothing to release
+        """Release resources; called once when the connection has ended."""
 
     def send(self, data: bytes) -> None:
-        """Queue `data` and send what the socket takes now."""
+        """Queue `data` and send what the socket accepts now."""
         if not self.open:
             return
         self._queue += data
@@ -54,12 +54,12 @@ class TcpClient(ABC):
             self._flush()
 
     def read_now(self) -> None:
-        """Take what has already arrived."""
+        """Read what has already arrived."""
         if self.open and not self._frozen:
             self._read()
 
     def freeze(self, frozen: bool) -> None:
-        """Neither read nor write until thawed; the connection stays."""
+        """Neither read nor write until thawed; the connection stays open."""
         if frozen == self._frozen or not self.open:
             return
         self._frozen = frozen
@@ -141,7 +141,7 @@ class TcpServer:
         loop.add_fd(self._sock.fileno(), self._on_ready)
 
     def freeze(self, frozen: bool) -> None:
-        """Like SIGSTOP: the kernel still accepts, nothing is answered until thawed."""
+        """Freeze as SIGSTOP does: the kernel still accepts connections, nothing is answered until thawed."""
         if frozen != self.frozen:
             self.frozen = frozen
             if frozen:
@@ -176,7 +176,7 @@ class TcpServer:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
         self.accepted += 1
         client = self._make_client(self, sock)
-        if client.open:  # one that has gone again before its greeting is not
+        if client.open:  # one that disconnected before its greeting is not
             self.clients.add(client)
 
 

@@ -1,14 +1,14 @@
-"""The Ridgeback's wheels, deterministic: what the wheel controller makes of the commands it hears.
+"""The Ridgeback's wheels, deterministic: how the wheel controller executes the commands it receives.
 
-Two clocks on one time line, both fixed at the start: a 1 ms grid on which the pose is integrated, and the
+Two clocks on one time axis, both fixed at the start: a 1 ms grid on which the pose is integrated, and the
 controller's own tick of 25 Hz (times one plus `rate_error`, shifted by `tick_phase` of a period), which acts at
 the first grid time that is not before it. At a tick the newest command that arrived by then is clamped to the
-speed limits, or taken for zero when it is older than 0.25 s, and approached with the acceleration limits, each
-axis by itself. Between ticks the wheels hold that velocity: the real ones follow it within a tick, and the
-contact does not care. The pose is integrated with the heading in the middle of each step.
+speed limits, or replaced by zero when it is older than 0.25 s, and approached within the acceleration limits, each
+axis on its own. Between ticks the wheels hold that velocity: the real ones reach it within a tick, which is
+negligible for the contact. The pose is integrated with the heading in the middle of each step.
 
-A tick acts when the plant leaves its grid time, so a command that arrives at exactly that time still counts,
-and the result does not depend on how the way there was split into calls.
+A tick takes effect when the plant leaves its grid time, so a command that arrives at exactly that time still counts,
+and the result does not depend on how the calls divide the time.
 Figures: ridgeback_control (control.yaml, mecanum_drive_controller, melodic-devel).
 """
 
@@ -35,7 +35,7 @@ _GRID_S = GRID_NS / NS_PER_S
 
 
 def clamp(value: float, low: float, high: float) -> float:
-    """Clamp as the controller does, min(max(low, x), high): NaN becomes `low`, full speed backwards."""
+    """Clamp as the controller does, min(max(low, x), high): NaN becomes `low`, which is full speed backwards."""
     raised = value if value > low else low
     return high if high < raised else raised
 
@@ -43,7 +43,7 @@ def clamp(value: float, low: float, high: float) -> float:
 class BasePlant:
     """A Ridgeback that rolls over the floor: commands in, pose and velocity out.
 
-    `start`: pose in the WORLD frame. `start_ns`: origin of both clocks. `tick_phase`: first tick after that part
+    `start`: pose in the WORLD frame. `start_ns`: origin of both clocks. `tick_phase`: first tick after this fraction
     of a period, in [0, 1). `rate_error`: relative error of the controller's clock (0.0001: 25.0025 Hz).
     """
 
@@ -89,30 +89,30 @@ class BasePlant:
         return self._drivers_active
 
     def command(self, twist: BodyTwist, arrival_ns: int) -> int:
-        """Hear a command (BODY frame, NaN as it comes); return the arrival time that counts.
+        """Accept a command (BODY frame, NaN allowed); return the arrival time that counts.
 
         It acts at the first tick that is not before its arrival. An arrival in the past counts as now, because
-        what has been passed through stays as it was; arrivals must not go back among themselves (ValueError).
+        the past is not recomputed; arrival times must not decrease (ValueError).
         """
         arrival_ns = max(arrival_ns, self._now_ns)
         if self._commands and arrival_ns < self._commands[-1][0]:
-            raise ValueError(f"command arrived before the one before it: {arrival_ns} < {self._commands[-1][0]}")
+            raise ValueError(f"command arrived before the previous one: {arrival_ns} < {self._commands[-1][0]}")
         self._commands.append((arrival_ns, twist))
         return arrival_ns
 
     def set_drivers(self, active: bool, at_ns: int) -> int:
         """Switch the motors at the first tick not before `at_ns`; return the time that counts.
 
-        Without drivers the wheels are held: they stand from that tick on. Driven again, they start from rest.
+        Without drivers the wheels are locked: they are at rest from that tick on, and start from rest afterwards.
         """
         at_ns = max(at_ns, self._now_ns)
         if self._switches and at_ns < self._switches[-1][0]:
-            raise ValueError(f"drivers switched before the time of the switch before: {at_ns}")
+            raise ValueError(f"drivers switched before the previous switch: {at_ns}")
         self._switches.append((at_ns, active))
         return at_ns
 
     def step_to(self, t_ns: int) -> None:
-        """Step to the last grid time that is not after `t_ns`; the past is left as it is."""
+        """Step to the last grid time that is not after `t_ns`; an earlier time changes nothing."""
         while self._now_ns + GRID_NS <= t_ns:
             if self._now_ns >= self._tick_due_ns:
                 self._control_tick()
@@ -158,5 +158,5 @@ def _approach(target: float, before: float, limit: float, step: float) -> float:
     wanted = clamp(target, -limit, limit)
     change = wanted - before
     if -step <= change <= step:
-        return wanted  # not before + change, which would miss the target by a rounding
+        return wanted  # not before + change, which would miss the target by a rounding error
     return before + clamp(change, -step, step)

@@ -1,7 +1,7 @@
-"""What an emulated or simulated device asks of the world it measures.
+"""The interfaces through which emulated and simulated devices read the world.
 
-Times are CLOCK_MONOTONIC ns (virtual at level `sim`). The world lives on a fixed 1 ms grid and catches up to
-the asked time before it answers; asking never changes what happens.
+Times are CLOCK_MONOTONIC ns (virtual at level `sim`). The world lives on a fixed 1 ms grid and advances to
+the requested time before it answers; reading never changes what happens.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class BaseTruth(msgspec.Struct, frozen=True, gc=False):
 
 
 class FtSource(Protocol):
-    """Where an FT 300 gets its reading."""
+    """Source of an FT 300's readings."""
 
     def read_ft(self, t_ns: int) -> tuple[float, float, float, float, float, float]:
         """Return N, N*m in the SENSOR frame at `t_ns`, with bias, tool weight and noise, not quantised."""
@@ -36,7 +36,7 @@ class FtSource(Protocol):
 
 
 class ArmSource(Protocol):
-    """Where a UR10 gets its joints."""
+    """Source of a UR10's joints."""
 
     def read_arm(self, t_ns: int) -> ArmTruth:
         """Return the joints at `t_ns`."""
@@ -44,7 +44,7 @@ class ArmSource(Protocol):
 
 
 class BaseSource(Protocol):
-    """Where a Ridgeback gets its motion, and where its wheels get their command."""
+    """Source of a Ridgeback's motion, and sink for its wheel commands."""
 
     def read_base(self, t_ns: int) -> BaseTruth:
         """Return pose and velocity at `t_ns`."""

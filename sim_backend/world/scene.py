@@ -1,4 +1,4 @@
-"""Where things stand before a simulated push: from the rig's `[world.start]` to poses in the WORLD frame."""
+"""Start poses of a simulated push: turns the rig's `[world.start]` into poses in the WORLD frame."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def slider_model(config: SliderConfig) -> SliderModel:
 
 
 def floor_of(rig: RigConfig, seed: int) -> Floor | None:
-    """Return what the rig's floor does beyond the slider's ellipsoid, None for nothing. Raises ConfigError."""
+    """Return the rig's floor effects beyond the slider's ellipsoid, or None without any. Raises ConfigError."""
     config = rig.world.floor
     if config == FloorConfig():
         return None
@@ -58,7 +58,7 @@ def floor_of(rig: RigConfig, seed: int) -> Floor | None:
 
 
 def place(rig: RigConfig, seed: int) -> Scene:
-    """Return where base and slider stand; each seed varies the start within the rig's `spread`.
+    """Return the start poses of base and slider; each seed varies the start within the rig's `spread`.
 
     The ball's centre starts at the path's origin, moved sideways by the lateral offset. It meets the object
     after `gap_m` along the path, at `edge_offset_m` from the middle of the pushed face.

@@ -1,7 +1,7 @@
-"""What an FT 300 between arm and ball measures: the reaction on the tool, its moment, the tool's weight, its errors.
+"""Model of an FT 300 between arm and ball: the reaction on the tool, its moment, the tool's weight, sensor errors.
 
-Written down from the geometry, not from the driver's side: Newton's third law gives the force on the tool, the
-lever arm from the sensor's origin to the contact gives the moment, gravity gives the tool's share.
+Derived from the geometry, independently of the driver: Newton's third law gives the force on the tool, the
+lever arm from the sensor's origin to the contact gives the moment, gravity gives the tool's weight.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The simulated world: base, contact ball, pushed object and sensor on one fixed 1 ms grid.
 
-The world catches up to the asked time before it answers; asking never changes what happens. What happens
-depends on start, parameters, seed and the arrival of each command only, and all of that goes to `on_record`,
-so that the world can be run again bit for bit.
+The world advances to the requested time before it answers; reading never changes what happens. What happens
+depends only on start, parameters, seed and the arrival of each command, and all of these go to `on_record`,
+so that the world can be re-run bit for bit.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from sim_backend.world.sensor_model import SensorModel
 
 STATE_EVERY_STEPS = 10
 STALL_STEPS = 30
-"""More than this many steps late: the host paused, and the log says so."""
+"""More than this many steps late means that the host paused, which is logged."""
 
 WorldRecord = WorldStart | WorldCommand | WorldState | WorldStall
 
 
 def _ignore(record: WorldRecord) -> None:
-    """Keep no record."""
+    """Discard the record."""
 
 
 class World:
@@ -65,7 +65,7 @@ class World:
 
     @property
     def now_ns(self) -> int:
-        """Grid time up to which everything has happened."""
+        """Grid time up to which the world has been simulated."""
         return self._start_ns + self._steps * GRID_NS
 
     def advance_to(self, t_ns: int) -> None:

@@ -61,7 +61,7 @@ give(q=r.getActualQ(), target=r.getTargetQ(), mode=r.getRobotMode(), safety=r.ge
     assert (seen["scaling"], seen["volts"], seen["stopped"], seen["int12"]) == (1.0, 48.0, [False, False], 0)
     assert seen["inertia"] == [0.0] * 6
     assert len(seen["cog"]) == len(seen["accelerometer"]) == 3
-    asked = [line for line in robot.get("seen.handshake") if line.startswith("O ")]
+    asked = [line for line in robot.get("requests.handshake") if line.startswith("O ")]
     assert asked, "it negotiated its outputs"
 
 

@@ -147,10 +147,10 @@ def test_input_bits_are_kept_like_every_input(robot, rtde2) -> None:
 
 def test_an_input_frame_of_the_wrong_size_changes_nothing(robot, rtde2) -> None:
     assert rtde2.ask_text("I", b"", "input_int_register_9") == b"\x01INT32"
-    before = robot.get("seen.bad_frames")
+    before = robot.get("requests.bad_frames")
     rtde2.send("0009550100000001ff")
     rtde2.send("00085502000000ff")
-    wait_until(lambda: robot.get("seen.bad_frames") == before + 2, "both are counted as bad")
+    wait_until(lambda: robot.get("requests.bad_frames") == before + 2, "both are counted as bad")
     assert robot.get("controller.registers.int_in")[9] == 0
 
 

@@ -53,8 +53,8 @@ def test_nothing_starts_before_the_closing_end(robot) -> None:
     with socket.create_connection((robot.host, 30002), timeout=3) as connection:
         part = b"def hello():\n  if True:\n    sync()\n  end\n"
         connection.sendall(part)
-        wait_until(lambda: robot.get("seen.script_bytes") == len(part), "the first part arrived")
-        assert list(robot.get("seen.scripts")) == []
+        wait_until(lambda: robot.get("requests.script_bytes") == len(part), "the first part arrived")
+        assert list(robot.get("requests.scripts")) == []
         connection.sendall(b"end\n")
         wait_until(lambda: runtime(robot) == PLAYING, "it plays after the end")
 
@@ -66,16 +66,16 @@ def test_an_indented_program_is_one_program(robot) -> None:
     wait_until(lambda: runtime(robot) == PLAYING, "it plays")
     wait_cycles(robot, 10)
     assert robot.get("controller.program.name") == "svt"
-    assert len(list(robot.get("seen.scripts"))) == 1
+    assert len(list(robot.get("requests.scripts"))) == 1
     upload(robot.host, "def other():\n  sync()\nend  \r\n", 30001)  # blanks and CR behind the end
-    wait_until(lambda: list(robot.get("seen.scripts"))[1:] == ["def other():"], "the next one is complete too")
+    wait_until(lambda: list(robot.get("requests.scripts"))[1:] == ["def other():"], "the next one is complete too")
 
 
 def test_a_secondary_program_leaves_the_running_one_alone(robot) -> None:
     upload(robot.host, "def first():\n  sync()\nend\n")
     wait_until(lambda: runtime(robot) == PLAYING, "the first plays")
     upload(robot.host, "sec beside():\n  textmsg(1)\nend\n", 30002)
-    wait_until(lambda: len(robot.get("seen.scripts")) == 2, "the second arrived")
+    wait_until(lambda: len(robot.get("requests.scripts")) == 2, "the second arrived")
     assert robot.get("controller.program.name") == "first"
     assert runtime(robot) == PLAYING
 

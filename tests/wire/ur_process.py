@@ -35,7 +35,7 @@ def wait_until(condition: Callable[[], Any], what: str, within_s: float = 5.0) -
 
 
 class EmulatorProcess:
-    """Calls of methods run in the emulator: `emulator.call("freeze", True)`, `emulator.get("seen.script_bytes")`."""
+    """Calls of methods run in the emulator: `robot.call("freeze", True)`, `robot.get("requests.script_bytes")`."""
 
     def __init__(self, host: str | None = None, **options: Any) -> None:
         self.host = host or fresh_address()

@@ -78,14 +78,14 @@ def test_drain_gives_a_state_once(robot, arm) -> None:
 def test_monitor_sends_nothing_that_could_move_the_arm(robot) -> None:
     with Ur10(robot.host) as arm:
         wait_until(lambda: arm.read().packets > 50, "half a second of data")
-    assert robot.get("seen.input_setups") == 0
-    assert robot.get("seen.input_frames") == 0
-    assert robot.get("seen.script_bytes") == 0
+    assert robot.get("requests.input_setups") == 0
+    assert robot.get("requests.input_frames") == 0
+    assert robot.get("requests.script_bytes") == 0
     assert robot.get("counters.script_accepted") == 0
-    lines = robot.get("seen.dashboard_lines")
+    lines = robot.get("requests.dashboard_lines")
     assert lines, "the preflight asked"
     assert [line for line in lines if line.startswith(MOVING_LINES)] == []
-    assert {line[0] for line in robot.get("seen.handshake")} <= set("VvOS")
+    assert {line[0] for line in robot.get("requests.handshake")} <= set("VvOS")
 
 
 def test_monitor_leaves_a_playing_program_alone(robot) -> None:

@@ -38,9 +38,9 @@ def test_a_healthy_controller_is_identified(robot) -> None:
 
 def test_nothing_that_could_move_the_arm_is_sent(robot) -> None:
     preflight(robot.host)
-    assert robot.get("seen.input_setups") == 0
-    assert robot.get("seen.script_bytes") == 0
-    asked = set(robot.get("seen.dashboard_lines"))
+    assert robot.get("requests.input_setups") == 0
+    assert robot.get("requests.script_bytes") == 0
+    asked = set(robot.get("requests.dashboard_lines"))
     assert asked <= {"get robot model", "get serial number", "robotmode", "safetymode", "running"}
 
 

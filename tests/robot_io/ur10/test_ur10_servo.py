@@ -133,9 +133,9 @@ def test_refuses_a_playing_program_and_leaves_it_playing(robot) -> None:
         Ur10(robot.host, hold="servo", held_pose_rad=HELD).open()
     assert robot.get("controller.runtime_state") == 2
     assert robot.get("controller.program.name") == "theirs"
-    assert robot.get("seen.script_bytes") == 0
-    assert robot.get("seen.input_setups") == 0
-    assert "stop" not in robot.get("seen.dashboard_lines")
+    assert robot.get("requests.script_bytes") == 0
+    assert robot.get("requests.input_setups") == 0
+    assert "stop" not in robot.get("requests.dashboard_lines")
 
 
 def test_refuses_a_paused_program(robot) -> None:
@@ -151,14 +151,14 @@ def test_refuses_another_pose(robot) -> None:
     robot.call("drift_step", [0, 0, 0.2, 0, 0, 0])
     with pytest.raises(DeviceNotReady, match=r"0\.200 rad from the held pose"):
         Ur10(robot.host, hold="servo", held_pose_rad=HELD, held_pose_tolerance_rad=0.05).open()
-    assert robot.get("seen.script_bytes") == 0
+    assert robot.get("requests.script_bytes") == 0
 
 
 def test_refuses_a_moving_arm(robot) -> None:
     robot.call("drift_rate", [0.03, 0, 0, 0, 0, 0])
     with pytest.raises(DeviceNotReady, match="moving"):
         Ur10(robot.host, hold="servo").open()
-    assert robot.get("seen.script_bytes") == 0
+    assert robot.get("requests.script_bytes") == 0
 
 
 @pytest.mark.long

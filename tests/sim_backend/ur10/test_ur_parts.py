@@ -17,8 +17,8 @@ from sim_backend.ur10.emulator import CB3_VERSION, UrEmulator
 from sim_backend.ur10.kinematics import flange_pose, rotation_vector
 from sim_backend.ur10.modes import RobotMode, SafetyMode, joint_mode, robot_status_bits, safety_bits
 from sim_backend.ur10.registers import Registers, Watchdog
+from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.rtde_server import RtdeServer
-from sim_backend.ur10.seen import Seen
 from sim_backend.ur10.standalone import HELD_POSE_RAD, StillArm
 from sim_backend.world.plant import ArmTruth
 from tests.wire.ur_process import fresh_address
@@ -112,18 +112,18 @@ def test_a_half_taken_address_leaves_nothing_open() -> None:
 
 def test_a_flood_of_requests_is_taken_a_little_at_a_time() -> None:
     """4096 bytes of one client in a turn of the loop, so that the cycle and the other clients have theirs between."""
-    loop, seen = EventLoop(), Seen()
+    loop, log = EventLoop(), RequestLog()
     # The port alone: a cycle that is late reads as well, and how many are late depends on the machine.
     host = fresh_address()
-    server = RtdeServer(loop, host, UrController(StillArm(), CB3_VERSION, now_ns=0), seen)
+    server = RtdeServer(loop, host, UrController(StillArm(), CB3_VERSION, now_ns=0), log)
     requests = 0
     with socket.create_connection((host, 30004)) as client:
         client.sendall(b"\x00\x03v" * 20_000)
         while requests < 20_000:
-            seen.handshake.clear()
+            log.handshake.clear()
             loop.run_once(1000)
-            assert len(seen.handshake) <= 4096 / 3 + 1  # one may have begun in the turn before
-            requests += len(seen.handshake)
+            assert len(log.handshake) <= 4096 / 3 + 1  # one may have begun in the turn before
+            requests += len(log.handshake)
     server.close()
     loop.close()
 
