@@ -137,7 +137,8 @@ def test_a_cut_log_names_the_rescue_and_the_rescued_part_replays(sim_log, tmp_pa
     assert 0 < told["identical"] == told["ticks"] < whole["ticks"]
     assert 0 < told["world"]["identical"] == told["world"]["states"] < whole["world"]["states"]
     assert told["complete"] is False
-    assert told["notes"] == [f"the log was recovered: it ends with tick {told['ticks'] - 1}, everything after that is lost"]
+    last = told["ticks"] - 1
+    assert told["notes"] == [f"the log was recovered: it ends with tick {last}; everything after that is lost"]
     assert main(["replay", str(saved)]) == 0
     assert "note: the log was recovered" in capsys.readouterr().out
 
