@@ -1,8 +1,9 @@
 """`push sweep hardware`: simulate the paper's experiment, each push a complete lockstep run of the program.
 
 A box and a barrel are pushed 6 m, ten times by the law with the paper's hardware gains and five times open loop, over a
-patchy floor, with sensor noise and base dynamics, through the same control step, safety checks and gate as a real run. Slider dimensions: 0.40 x 0.60 m and 4.5 kg, radius 0.25 m and 5 kg, floor
-friction 0.3, pushed 0.15 m above the floor.
+patchy floor, with sensor noise and base dynamics, through the same control step, safety checks and gate as a real run.
+The box measures 0.40 x 0.60 m and weighs 4.5 kg, the barrel has a radius of 0.25 m and weighs 5 kg; floor friction is
+0.3, and both are pushed 0.15 m above the floor.
 """
 
 from __future__ import annotations
