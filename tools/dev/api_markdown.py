@@ -137,9 +137,7 @@ def _annotations(member: type[Any]) -> Iterator[tuple[str, str]]:
     """Yield name and type of the public fields and of the attributes that `__init__` creates and documents."""
     for name, kind in inspect.get_annotations(member).items():
         if not name.startswith("_"):
-            text = (
-                kind.__forward_arg__ if isinstance(kind, ForwardRef) else str(kind)
-            )  # a NamedTuple wraps its annotations
+            text = kind.__forward_arg__ if isinstance(kind, ForwardRef) else str(kind)  # a NamedTuple wraps its types
             yield name, re.sub(r"^ClassVar\[(.*)\]$", r"\1", text)
     for name, kind, _ in _attributes(member):
         yield name, kind

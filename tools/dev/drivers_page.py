@@ -30,8 +30,8 @@ first used.
 
 ## What holds for every driver
 
-- **Order.** `open` identifies the device and `start` starts the data; `with` does both, and calls `stop` and `close` at
-  the end. `stop` and `close` may be called repeatedly and never raise. A closed driver can be opened again.
+- **Order.** `open` identifies the device and `start` begins the data flow; `with` does both, and calls `stop` and
+  `close` at the end. `stop` and `close` may be called repeatedly and never raise. A closed driver can be opened again.
 - **Timing.** Only `open`, `start`, `stop` and `close` (and the sensor's `probe`) block, each for the time its
   description gives. `drain`, `command` and `health` return at once. Drain at least every 20 ms (`select` on the driver
   if it has a `fileno`); when a driver's bounded buffer is full, the oldest data is dropped and counted.

@@ -51,9 +51,9 @@ def test_cat_and_export_read_what_middleware_writes(tmp_path, capsys, text, payl
 
 
 UNREADABLE = {
-    "/json": (by_hand.channel(2, 0, "/json", "json"), b"{}", "its messages are json, and only cdr"),
-    "/ros1": (by_hand.channel(3, 1, "/ros1", "ros1"), b"", "its messages are ros1, and only cdr"),
-    "/protobuf": (by_hand.channel(4, 1, "/protobuf", "protobuf"), b"", "its messages are protobuf, and only cdr"),
+    "/json": (by_hand.channel(2, 0, "/json", "json"), b"{}", "its messages are in json; only cdr"),
+    "/ros1": (by_hand.channel(3, 1, "/ros1", "ros1"), b"", "its messages are in ros1; only cdr"),
+    "/protobuf": (by_hand.channel(4, 1, "/protobuf", "protobuf"), b"", "its messages are in protobuf; only cdr"),
     "/bare": (by_hand.channel(5, 0, "/bare"), HELLO, "it has no schema"),
     "/xcdr2": (by_hand.channel(6, 1, "/xcdr2"), b"\x00\x07" + HELLO[2:], "CDR of version 2"),
     "/short": (by_hand.channel(7, 1, "/short"), HELLO[:9], "elements cannot fit"),
