@@ -131,7 +131,7 @@ def _notes(run: RunData, summary: dict[str, Any]) -> list[str]:
     if run.tick_stride > 1:
         notes.append(f"This log is long: figures show one tick in {run.tick_stride}.")
     if not run.slider_source:
-        notes.append("The object's pose is unknown: the log contains no motion capture of it.")
+        notes.append("The pose of the object is unknown: the log contains no motion capture of it.")
     more = summary.get("notes")
     return notes + [str(note) for note in more[:20]] if isinstance(more, list) else notes
 

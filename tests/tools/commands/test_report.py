@@ -188,7 +188,7 @@ def test_a_hardware_log_without_a_world_and_with_hostile_names(ran, ticks, tmp_p
     assert "\x1b" not in text
     assert "alert(1)" in seen.words["dd"] + seen.words["p"]
     assert len(seen.pictures) == 6
-    assert "The object's pose is unknown" in text
+    assert "The pose of the object is unknown" in text
     assert "Settings that differ from" in text
     assert baseline_of(rig) == "thing"
 
