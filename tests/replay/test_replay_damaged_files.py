@@ -51,9 +51,9 @@ NOT_OURS = {
     "random": (random.Random(1).randbytes(100_000), "not an MCAP"),
     "random behind the magic": (b"\x89MCAP0\r\n" + random.Random(2).randbytes(5000), "truncated"),
     "random within the magic": (b"\x89MCAP0\r\n" + random.Random(3).randbytes(5000) + b"\x89MCAP0\r\n", ""),
-    "another profile": (foreign("ros1", "cdr", config=None), "holds no config.toml"),
-    "another encoding": (foreign("ros2", "json", config=None), "holds no config.toml"),
-    "no config": (foreign("ros2", "cdr", config=None), "holds no config.toml"),
+    "another profile": (foreign("ros1", "cdr", config=None), "contains no config.toml"),
+    "another encoding": (foreign("ros2", "json", config=None), "contains no config.toml"),
+    "no config": (foreign("ros2", "cdr", config=None), "contains no config.toml"),
     "no rig": (foreign("ros2", "cdr", config="x = 1\n"), "config.toml"),
     "no toml": (foreign("ros2", "cdr", config="]["), "config.toml"),
     "deep toml": (foreign("ros2", "cdr", config="a = " + "[" * 100_000), "config.toml"),
@@ -137,7 +137,8 @@ def test_a_cut_log_names_the_rescue_and_the_rescued_part_replays(sim_log, tmp_pa
     assert 0 < told["identical"] == told["ticks"] < whole["ticks"]
     assert 0 < told["world"]["identical"] == told["world"]["states"] < whole["world"]["states"]
     assert told["complete"] is False
-    assert told["notes"] == [f"the log was recovered: it ends with tick {told['ticks'] - 1}, what came after is lost"]
+    last = told["ticks"] - 1
+    assert told["notes"] == [f"the log was recovered: it ends with tick {last}; everything after that is lost"]
     assert main(["replay", str(saved)]) == 0
     assert "note: the log was recovered" in capsys.readouterr().out
 

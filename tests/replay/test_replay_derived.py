@@ -182,4 +182,4 @@ def test_what_cannot_be_derived_is_a_difference_and_no_traceback(sim_ticks, tmp_
     core.tick(tick, 5)
     first = core.result(complete=True).first_difference
     assert first is not None
-    assert first.field == "what comes of /control/tick"
+    assert first.field == "derived from /control/tick"

@@ -132,7 +132,7 @@ def test_a_topic_that_was_derived_in_another_way_is_said_and_not_compared(
     monkeypatch.setattr(log_format, "CHANGED_TOPICS", (ChangedTopic("/diagnostics", 1),))
     code, told = replayed(capsys, edited)
     assert code == 0
-    assert "not compared, derived in another way today: /diagnostics" in told["notes"]
+    assert "not compared, because they are derived differently today: /diagnostics" in told["notes"]
 
 
 def test_a_world_with_another_state_is_run_again_and_compared_by_what_both_have(sim_log, tmp_path, capsys):

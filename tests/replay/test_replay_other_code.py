@@ -10,7 +10,7 @@ import pytest
 from tests.replay.runs import changed, replayed, rewritten
 from tools.cli import main
 from tools.replay import verified_log
-from tools.replay.made_by import made_by
+from tools.replay.code_origin import compare_code
 
 USAGE, DIFFERS, DAMAGED = 2, 7, 8
 THEN, NOW = "1" * 40, "2" * 40
@@ -176,6 +176,6 @@ def test_a_format_that_is_no_number_is_damage(said, sim_log, tmp_path, capsys):
 
 def test_two_installations_without_a_checkout_are_told_apart_by_their_version():
     installed = {"program": "single-point-push 0.1.0", "format": "2"}
-    assert not made_by(installed, installed, 2).other
-    assert made_by({**installed, "program": "single-point-push 0.2.0"}, installed, 2).other
-    assert made_by({"program": "single-point-push 0.1.0"}, installed, 1).other
+    assert not compare_code(installed, installed, 2).other
+    assert compare_code({**installed, "program": "single-point-push 0.2.0"}, installed, 2).other
+    assert compare_code({"program": "single-point-push 0.1.0"}, installed, 1).other

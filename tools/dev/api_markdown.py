@@ -1,4 +1,4 @@
-"""Classes and functions as Markdown, from their docstrings, signatures and the text below their fields."""
+"""Render classes and functions as Markdown, from their docstrings, signatures and the text below their fields."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ import msgspec
 from tools.dev.notes import notes_of
 
 WIDEST = 96
-"""A signature that is longer gets a line for each parameter."""
+"""A longer signature gets one line per parameter."""
 
 
 def entry(name: str, module: ModuleType, linked: set[str]) -> str:
-    """Return the part of the page on one public name; types of `linked` become links."""
+    """Return the Markdown section of one public name; types in `linked` become links."""
     member = getattr(module, name)
     lines = [f"### {name}\n"]
     if inspect.isclass(member):
@@ -37,7 +37,7 @@ def entry(name: str, module: ModuleType, linked: set[str]) -> str:
 def prose(text: str, parameters: frozenset[str] = frozenset()) -> str:
     """Return a docstring (`inspect.cleandoc`) as Markdown.
 
-    A line `parameter: text` becomes an item of a list, with the indented lines below it; a `*` stays one.
+    A line `parameter: text`, with the indented lines below it, becomes a list item; every `*` is kept literally.
     """
     lines: list[str] = []
     in_item = False
@@ -48,7 +48,7 @@ def prose(text: str, parameters: frozenset[str] = frozenset()) -> str:
             in_item = True
         else:
             if in_item and line and not line.startswith("    "):
-                lines.append("")  # or it would belong to the item
+                lines.append("")  # otherwise it would belong to the item
             in_item = in_item and line.startswith("    ")
             lines.append(f"  {_escaped(line.strip())}" if in_item else _escaped(line))
     return "\n".join(lines) + "\n"
@@ -81,10 +81,10 @@ def _class(member: type[Any], linked: set[str]) -> list[str]:
             *_table("value", [(i.name, str(i.value), notes.get(i.name, "")) for i in member]),
         ]
     plain = not issubclass(member, msgspec.Struct | tuple) and not getattr(member, "_is_protocol", False)
-    made = plain and "__init__" in vars(member)
-    lines = [_code(f"{member.__name__}{_signature(member, returns=False)}")] if made else []
-    lines.append(_prose(member) if made else prose(_doc(member)))
-    shown = {name: kind for name, kind in _annotations(member) if not made or notes.get(name)}
+    has_init = plain and "__init__" in vars(member)
+    lines = [_code(f"{member.__name__}{_signature(member, returns=False)}")] if has_init else []
+    lines.append(_prose(member) if has_init else prose(_doc(member)))
+    shown = {name: kind for name, kind in _annotations(member) if not has_init or notes.get(name)}
     shown |= {name: _returned(found.fget) for name, found in vars(member).items() if isinstance(found, property)}
     rows = [(name, _linked(kind, linked), notes.get(name, "")) for name, kind in shown.items()]
     lines += _table("type", rows)
@@ -96,7 +96,7 @@ def _class(member: type[Any], linked: set[str]) -> list[str]:
 
 
 def _constant(name: str, module: ModuleType) -> list[str]:
-    """Return the value, where it is short, and the text below it."""
+    """Return the value of a constant, if it is short, and the text below it."""
     body = ast.parse(inspect.getsource(module)).body
     for node, below in itertools.pairwise(body):
         target, text = _target(node), _text_in(below)
@@ -104,7 +104,7 @@ def _constant(name: str, module: ModuleType) -> list[str]:
             code = ast.unparse(node)
             shown = [_code(code)] if len(code) <= WIDEST else []
             return [*shown, prose(text)]
-    raise LookupError(f"{module.__name__} has no {name} with a text below it")
+    raise LookupError(f"{module.__name__} has no {name} with text below it")
 
 
 def _target(node: ast.stmt) -> ast.expr | None:
@@ -114,7 +114,7 @@ def _target(node: ast.stmt) -> ast.expr | None:
 
 
 def _text_in(node: ast.stmt) -> str:
-    """Return the text that a statement is, on one line; "" where it is none."""
+    """Return a string statement's text on one line; "" for any other statement."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return " ".join(str(node.value.value).split())
     return ""
@@ -134,10 +134,10 @@ def _linked(kind: str, linked: set[str]) -> str:
 
 
 def _annotations(member: type[Any]) -> Iterator[tuple[str, str]]:
-    """Yield name and type of the public fields and of the attributes that `__init__` makes and describes."""
+    """Yield name and type of the public fields and of the attributes that `__init__` creates and documents."""
     for name, kind in inspect.get_annotations(member).items():
         if not name.startswith("_"):
-            text = kind.__forward_arg__ if isinstance(kind, ForwardRef) else str(kind)  # a NamedTuple wraps its own
+            text = kind.__forward_arg__ if isinstance(kind, ForwardRef) else str(kind)  # a NamedTuple wraps its types
             yield name, re.sub(r"^ClassVar\[(.*)\]$", r"\1", text)
     for name, kind, _ in _attributes(member):
         yield name, kind
@@ -148,9 +148,9 @@ def _attributes(member: type[Any]) -> Iterator[tuple[str, str, str]]:
     if "__init__" not in vars(member) or not inspect.isfunction(member.__init__):
         return
     source = textwrap.dedent(inspect.getsource(member.__init__))
-    [made] = ast.parse(source).body
-    assert isinstance(made, ast.FunctionDef)
-    for node, below in itertools.pairwise(made.body):
+    [init] = ast.parse(source).body
+    assert isinstance(init, ast.FunctionDef)
+    for node, below in itertools.pairwise(init.body):
         target, text = _target(node), _text_in(below)
         if text and isinstance(target, ast.Attribute) and not target.attr.startswith("_"):
             assert isinstance(node, ast.Assign | ast.AnnAssign)
@@ -173,7 +173,7 @@ def _notes(member: type[Any]) -> dict[str, str]:
 
 
 def _methods(member: type[Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the public methods that say something of their own."""
+    """Yield the public methods with a docstring of their own."""
     for name, found in vars(member).items():
         method = found.__func__ if isinstance(found, classmethod | staticmethod) else found
         if name.startswith("_") or not inspect.isfunction(method) or not method.__doc__:
@@ -187,7 +187,7 @@ def _returned(function: Any) -> str:
 
 
 def _signature(member: Any, *, returns: bool = True) -> str:
-    """Return parameters with types and defaults, as in the source but for self."""
+    """Return parameters with types and defaults, as in the source but without self."""
     signature = inspect.signature(member)
     shown = []
     starred = False

@@ -1,4 +1,4 @@
-"""Writes docs/drivers.md, the API of the library, from its docstrings; the examples are those of the README.
+"""Write docs/drivers.md, the API reference of the library, from its docstrings and the examples in the README.
 
 python -m tools.dev.drivers_page > docs/drivers.md
 """
@@ -20,43 +20,43 @@ README = Path(__file__).resolve().parents[2] / "README.md"
 
 INTRO = """# The drivers as a library
 
-`robot_io` is usable on its own, in an environment of yours; the program `push` runs from a checkout only.
+`robot_io` is usable on its own, in your own environment; the program `push` runs only from a checkout.
 
-    pip install path/to/checkout                     # robot_io and what it imports; nothing named control or tools
-    pip install git+ssh://git.example.org/push.git    # the same from a git repository of yours
+    pip install path/to/checkout                     # robot_io and its dependencies; no control or tools
+    pip install git+ssh://git.example.org/push.git    # the same from your git repository
 
 It is typed (`py.typed`), and importing it loads neither numpy nor a device: each driver is loaded when it is
 first used.
 
 ## What holds for every driver
 
-- **Order.** `open` identifies the device and `start` begins the flow; `with` does both, and `stop` and `close` at the
-  end. `stop` and `close` may be called again and never raise. A closed driver can be opened again.
-- **Timing.** Only `open`, `start`, `stop` and `close` (and the sensor's `probe`) wait, each for a time that its text
-  names. `drain`, `command` and `health` return at once. Drain at least every 20 ms (`select` on the driver where it has
-  a `fileno`); what does not fit into a driver's bounded buffer is dropped, oldest first, and counted.
+- **Order.** `open` identifies the device and `start` begins the data flow; `with` does both, and calls `stop` and
+  `close` at the end. `stop` and `close` may be called repeatedly and never raise. A closed driver can be opened again.
+- **Timing.** Only `open`, `start`, `stop` and `close` (and the sensor's `probe`) block, each for the time its
+  description gives. `drain`, `command` and `health` return at once. Drain at least every 20 ms (`select` on the driver
+  if it has a `fileno`); when a driver's bounded buffer is full, the oldest data is dropped and counted.
 - **Threads.** A driver starts no threads and takes no locks: use it from the thread that opened it. The UR10's
   connection lives in a child process, which dies with that thread.
-- **Units and frames.** SI: N, N\\*m, m, rad, s; the unit is in the name where there could be a doubt. Frames:
+- **Units and frames.** SI: N, N\\*m, m, rad, s; the unit is part of the name where it could be in doubt. Frames:
   [frames and signs](frames-and-signs.md). `received_ns` is CLOCK_MONOTONIC (`time.monotonic_ns`).
 - **Errors.** `open` and `start` raise errors of [one tree](#errors), each with `what`, `where` and `do`. A link that is
-  lost later raises nothing: `drain` gives nothing more, `health` says `LOST` and why. A driver never comes back by
+  lost later raises nothing: `drain` returns nothing more, `health` reports `LOST` and why. A driver never reconnects by
   itself: open it again.
-- **Emulators.** No device? `push emulate ft300`, `ur10` or `ridgeback` in a checkout serves the real bytes to any
-  client.
+- **Emulators.** No device? `push emulate ft300`, `ur10` or `ridgeback` in a checkout serves the real protocol to
+  any client.
 """
 
 
 class Part(NamedTuple):
-    """A section: public names of one module."""
+    """A section of the page: public names of one module."""
 
     title: str
     module: str
     names: tuple[str, ...]
     text_of: str = ""
-    """Module whose docstring introduces the section, but for its first line."""
+    """Module whose docstring, without its first line, introduces the section."""
     example: str = ""
-    """Class by which the README's example is found."""
+    """Class that identifies the README's example."""
     more: str = ""
 
 
@@ -68,8 +68,8 @@ PARTS = (
         "Devices by kind",
         "robot_io.kinds",
         ("open_device", "build_driver", "find_kind"),
-        more="A rig names each device by its kind: a shipped name, or a class of your own ([how](add-a-device.md)).\n"
-        "`open_device` is in `robot_io` itself, too, as the three drivers are.",
+        more="A rig names each device by its kind: a shipped name or your own class ([how](add-a-device.md)).\n"
+        "`open_device` and the three drivers are also available in `robot_io` itself.",
     ),
     Part(
         "The contract of a driver",
@@ -110,7 +110,7 @@ def page() -> str:
     """Return the page."""
     linked = {name for part in PARTS for name in part.names}
     contents = " · ".join(f"[{part.title}](#{part.title.lower().replace(' ', '-')})" for part in PARTS)
-    parts = [INTRO, f"The rest of this page, by room: {contents}.\n"]
+    parts = [INTRO, f"Sections of this page: {contents}.\n"]
     for part in PARTS:
         members = ", ".join(f"[{name}](#{name.lower()})" for name in part.names)
         parts.append(f"## {part.title}\n\nIn `{part.module}`: {members}.\n")
@@ -122,12 +122,12 @@ def page() -> str:
     return re.sub(r"\n{3,}", "\n\n", "\n".join(parts)).rstrip() + "\n"
 
 
-def _home(room: ModuleType, name: str) -> ModuleType:
-    """Return the module that defines what a room exports: the one that the room's type checker is told."""
-    for node in ast.walk(ast.parse(inspect.getsource(room))):
+def _home(package: ModuleType, name: str) -> ModuleType:
+    """Return the module that defines a name a package exports, found in the imports for the type checker."""
+    for node in ast.walk(ast.parse(inspect.getsource(package))):
         if isinstance(node, ast.ImportFrom) and name in (found.name for found in node.names):
             return importlib.import_module(str(node.module))
-    return room
+    return package
 
 
 def _example(name: str) -> str:
@@ -137,7 +137,7 @@ def _example(name: str) -> str:
 
 
 def _introduction(module: str) -> str:
-    """Return a module's docstring as Markdown, but for its first line, which says what the title says."""
+    """Return a module's docstring as Markdown without its first line, which repeats the title."""
     doc = inspect.getdoc(importlib.import_module(module)) or ""
     return prose(doc.partition("\n")[2])
 

@@ -1,4 +1,4 @@
-"""Writes the fault table for docs/safety.md from `safety/faults.py`: `python -m tools.dev.fault_table`."""
+"""Write the fault table for docs/safety.md from `safety/faults.py`: `python -m tools.dev.fault_table`."""
 
 from __future__ import annotations
 

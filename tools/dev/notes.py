@@ -1,4 +1,4 @@
-"""The text below a field or an enum's member in the source, which Python itself does not keep."""
+"""Read the text below fields and enum members from the source, because Python does not keep it at run time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes docs/rig-files.md from the types of `robot_io/rig`.
+"""Write docs/rig-files.md from the types of `robot_io/rig`.
 
 python -m tools.dev.rig_reference > docs/rig-files.md
 """
@@ -20,8 +20,8 @@ from tools.dev.notes import notes_of
 
 INTRO = """# Rig files
 
-A rig file is TOML and describes one robot, real or not. `push run NAME` takes a shipped one (`sim`, `emulated`,
-`barrel`, `paper-gains`, `thing`), `push run FILE` yours. Write only what differs:
+A rig file is TOML and describes one robot, real or not. `push run NAME` uses a shipped one (`sim`, `emulated`,
+`barrel`, `paper-gains`, `thing`), `push run FILE` your own. Write only what differs:
 
     extends = "emulated"
     name = "mine"
@@ -30,18 +30,19 @@ A rig file is TOML and describes one robot, real or not. `push run NAME` takes a
     push_speed_m_per_s = 0.08
 
 `push config show RIG` prints every value, `push config check RIG` reports every mistake at once, and
-`--set control.k_f=0.1` changes one value for one run. The unit is in the key; ranges are checked; an unknown key names
-the nearest known one. The program's own ceilings (`safety/limits.py`) may only be lowered.
+`--set control.k_f=0.1` changes one value for one run. The unit is in the key; ranges are checked; for an unknown
+key the nearest known one is suggested. The program's own ceilings (`safety/limits.py`) may only be lowered.
 
 `level` is set for each device: `sim` (all three or none), `emulated` (the real driver on a wire emulator) or
-`hardware`; the last two mix. `ft.port` is a device path, a pty or `socket://host:port`.
+`hardware`; the last two can be mixed. `ft.port` is a device path, a pty or `socket://host:port`.
 """
 
 
 RENAMES = """
 ## Renamed keys
 
-`push config check` names every one of these in a rig file, with its line. In logs they are read by the log's format.
+`push config check` reports each of these in a rig file, with its line. In logs they are read according to the log's
+format.
 """
 
 
@@ -50,7 +51,7 @@ def reference() -> str:
     parts = [INTRO]
     notes = notes_of(config, topics, world)
     for title, table in _tables(RigConfig, ""):
-        parts.append(f"\n## {f'[{title}]' if title else 'At the top'}\n")
+        parts.append(f"\n## {f'[{title}]' if title else 'Top level'}\n")
         doc = inspect.cleandoc(table.__doc__ or "")
         parts.append(doc + "\n")
         parts.append("| key | type and range | default | |\n|---|---|---|---|")

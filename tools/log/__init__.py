@@ -1,1 +1,1 @@
-"""What a run writes and how it is decoded: topics of the tick, of the scene, of the world."""
+"""Writing and decoding a run's log: topics derived from ticks, the scene and the simulated world."""

@@ -1,4 +1,4 @@
-"""Reads the messages of a log as plain values: by the schema that stands in the log itself."""
+"""Decode the messages of a log into plain values, by the schemas stored in the log itself."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robot_io.mcap.log_file import LIBRARY, MESSAGE_ENCODING, SCHEMA_ENCODING
 from robot_io.mcap.read import LogSummary
 from robot_io.mcap.walk import Topic, walk
 
-# Unit of a field by the type that holds it; an empty field name stands for every field of the type.
+# Unit of each field, by message type; an empty field name applies to every field of the type.
 _UNITS: dict[str, dict[str, str]] = {
     "geometry_msgs/msg/Wrench": {"force": "N", "torque": "N*m"},
     "geometry_msgs/msg/Twist": {"linear": "m/s", "angular": "rad/s"},
@@ -35,7 +35,7 @@ _UNITS: dict[str, dict[str, str]] = {
 
 
 class Decoded(NamedTuple):
-    """One message with its values, and their shape."""
+    """One message with its decoded values and their shape."""
 
     topic: str
     log_time_ns: int
@@ -45,7 +45,7 @@ class Decoded(NamedTuple):
 
 
 class _Type(NamedTuple):
-    """What the messages of a channel are; a topic of a log by others may have several."""
+    """Type and encodings of a channel's messages; in a log by other software a topic may have several."""
 
     topic: str
     name: str
@@ -60,13 +60,13 @@ class _Decoder(NamedTuple):
 
 
 class Decoders:
-    """Reads the wanted topics of a log (None: all); `unreadable` names those that cannot be read, with the reason."""
+    """Decodes the given topics of a log (None: all); `unreadable` gives the reason for each that cannot be decoded."""
 
     def __init__(self, summary: LogSummary, topics: list[str] | None) -> None:
         known = {channel.topic for channel in summary.channels}
         missing = sorted(set(topics or ()) - known)
         if missing:
-            raise UsageError(f"the log has no topic {', '.join(missing)}", do=f"It has {', '.join(sorted(known))}")
+            raise UsageError(f"the log has no topic {', '.join(missing)}", do=f"Choose from {', '.join(sorted(known))}")
         self._ours = summary.library == LIBRARY
         self._decoders: dict[_Type, _Decoder] = {}
         self.unreadable: dict[str, str] = {}
@@ -83,38 +83,38 @@ class Decoders:
                 )
 
     def read(self, path: Path) -> Iterator[Decoded]:
-        """Yield the messages of the wanted, readable topics; a payload that does not fit ends the reading of its kind.
+        """Yield the messages of the chosen, decodable topics.
 
-        Raises as `read_log`.
+        A payload that does not match its schema ends the decoding of that topic and type. Raises as `read_log`.
         """
         types: dict[int, _Type] = {}
         for item in walk(path):
             if isinstance(item, Topic):
                 types[item.channel.id] = _type_of(item)
             elif isinstance(item, Message):
-                its_type = types[item.channel_id]
-                decoder = self._decoders.get(its_type)
+                message_type = types[item.channel_id]
+                decoder = self._decoders.get(message_type)
                 if decoder is None:
                     continue
                 try:
                     value = decoder.decode(item.data)
                 except LogDamaged as damage:
-                    self.unreadable[its_type.topic] = damage.what
-                    del self._decoders[its_type]
+                    self.unreadable[message_type.topic] = damage.what
+                    del self._decoders[message_type]
                     continue
-                yield Decoded(its_type.topic, item.log_time, its_type.name, decoder.shape, value)
+                yield Decoded(message_type.topic, item.log_time, message_type.name, decoder.shape, value)
 
-    def _add(self, its_type: _Type) -> None:
+    def _add(self, message_type: _Type) -> None:
         try:
-            _require_known_encoding(its_type)
+            _require_known_encoding(message_type)
             if self._ours:
-                cdr_type = type_from_schema(its_type.name, its_type.text)
-                self._decoders[its_type] = _Decoder(cdr_type.shape, cdr_type.decode)
+                cdr_type = type_from_schema(message_type.name, message_type.text)
+                self._decoders[message_type] = _Decoder(cdr_type.shape, cdr_type.decode)
             else:
-                shape = shape_from_schema(its_type.name, its_type.text)
-                self._decoders[its_type] = _Decoder(shape, ReaderOfOthers(its_type.name, shape).decode)
+                shape = shape_from_schema(message_type.name, message_type.text)
+                self._decoders[message_type] = _Decoder(shape, ReaderOfOthers(message_type.name, shape).decode)
         except LogDamaged as damage:
-            self.unreadable[its_type.topic] = damage.what
+            self.unreadable[message_type.topic] = damage.what
 
 
 def _type_of(topic: Topic) -> _Type:
@@ -123,20 +123,20 @@ def _type_of(topic: Topic) -> _Type:
     return _Type(channel.topic, schema.name, text, channel.message_encoding, schema.encoding)
 
 
-def _require_known_encoding(its_type: _Type) -> None:
-    if its_type.message_encoding != MESSAGE_ENCODING:
-        named = its_type.message_encoding[:20] or "of no named encoding"
-        raise LogDamaged(f"its messages are {named}, and only {MESSAGE_ENCODING} can be read")
-    if not its_type.schema_encoding:
-        raise LogDamaged("it has no schema, so that nothing says what its bytes mean")
-    if its_type.schema_encoding != SCHEMA_ENCODING:
-        raise LogDamaged(f"its schema is {its_type.schema_encoding[:20]}, and only {SCHEMA_ENCODING} can be read")
+def _require_known_encoding(message_type: _Type) -> None:
+    if message_type.message_encoding != MESSAGE_ENCODING:
+        named = message_type.message_encoding[:20] or "an unnamed encoding"
+        raise LogDamaged(f"its messages are in {named}; only {MESSAGE_ENCODING} can be read")
+    if not message_type.schema_encoding:
+        raise LogDamaged("it has no schema, so its bytes cannot be decoded")
+    if message_type.schema_encoding != SCHEMA_ENCODING:
+        raise LogDamaged(f"its schema is {message_type.schema_encoding[:20]}; only {SCHEMA_ENCODING} can be read")
 
 
 def columns(shape: Nested, value: Any) -> list[tuple[str, Any]]:
-    """Return a message of this shape as (column name with its unit, cell).
+    """Return a message of this shape as pairs (column name with unit, cell).
 
-    Structs and arrays of fixed length become a column each; a sequence of any length is one cell of JSON.
+    Each leaf of a struct or fixed-length array becomes a column; a sequence of variable length is one cell of JSON.
     """
     return [(f"{name} [{unit}]" if unit else name, cell) for name, unit, cell in _cells(shape, value, "", "")]
 

@@ -1,6 +1,6 @@
-"""All that a log holds beyond its records, made from them: by the recorder while it writes, by replay to compare.
+"""Derive the additional topics of a log from its records: the recorder writes them, replay compares them.
 
-The tick gives what people plot, the object's pose its frame, the rig what a 3-D viewer needs.
+Ticks give the topics people plot, the object's pose gives its frame, the rig gives what a 3-D viewer needs.
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ SLIDER_TOPIC = "/slider/pose"
 
 
 class Derivation:
-    """Takes the records of one log in the order in which they were written; times are log times in ns."""
+    """Derives messages from the records of one log, given in the order written; times are log times in ns."""
 
     def __init__(self, rig: RigConfig, wall_offset_ns: int) -> None:
         self._rig = rig
         self._topics = TickTopics(wall_offset_ns, device_names(rig))
-        # With motion capture of the object its pose is what was seen, else it is the world's truth.
-        self.slider_is_seen = bool(rig.base.topics.slider_pose)
+        # With motion capture the object's pose is measured, otherwise it is the simulated ground truth.
+        self.slider_is_tracked = bool(rig.base.topics.slider_pose)
 
     def scene(self, first_ns: int) -> list[Message]:
-        """Return what is said once, before the first record, which is of `first_ns`."""
+        """Return the messages written once, before the first record, whose log time is `first_ns`."""
         return scene_messages(self._rig, first_ns)
 
     def tick(self, tick: ControlTick) -> list[Message]:
-        """Return what is made from a tick."""
+        """Return the messages derived from a tick."""
         return self._topics.expand(tick)
 
     def world(self, state: WorldState, log_time_ns: int) -> list[Message]:
-        """Return what is made from a state of the world."""
-        if self.slider_is_seen:
+        """Return the messages derived from a state of the simulated world."""
+        if self.slider_is_tracked:
             return []
         pose = planar_pose(state.slider.x, state.slider.y, state.slider.yaw)
         return [slider_pose(pose, log_time_ns), slider_frame(pose, log_time_ns)]
 
     def slider(self, payload: bytes, log_time_ns: int) -> list[Message]:
-        """Return what is made from a pose of the object that was seen. Raises LogDamaged when it is none."""
-        return [slider_frame(POSE_STAMPED.decode(payload).pose, log_time_ns)] if self.slider_is_seen else []
+        """Return the messages derived from a tracked pose of the object. Raises LogDamaged if it cannot be decoded."""
+        return [slider_frame(POSE_STAMPED.decode(payload).pose, log_time_ns)] if self.slider_is_tracked else []

@@ -1,7 +1,7 @@
 """The log of one run as the recorder and level `sim` write it: ring records in, topics out.
 
-The control tick is chained and written as it is, then the topics people plot are derived from it; every other kind
-is written as it comes. Topics are declared when they are first used.
+Each control tick is added to the checksum chain and written, followed by the topics people plot, derived from it;
+every other kind is written unchanged. Topics are declared on first use.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ OFFSET_FACT = "wall_offset_ns"
 class RunLog:
     """One part of a run's log.
 
-    config_text: the resolved rig. wall_offset_ns: added to every time of a record to get its log time; it is noted
-    among `metadata`. Raises as `McapLog` and `rig_from_toml`; OSError when the disk fails while writing.
+    config_text: the resolved rig. wall_offset_ns: added to each record's time to get its log time; stored in
+    `metadata`. Raises as `McapLog` and `rig_from_toml`; OSError when writing to disk fails.
     """
 
     def __init__(self, path: Path, *, config_text: str, metadata: dict[str, str], wall_offset_ns: int) -> None:
@@ -43,11 +43,11 @@ class RunLog:
 
     @property
     def messages(self) -> int:
-        """How many messages were written, derived ones included."""
+        """Number of messages written, including derived ones."""
         return self._log.messages
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
-        """Write one ring record and what is derived from it. Raises OSError when the disk fails."""
+        """Write one ring record and the messages derived from it. Raises OSError when writing to disk fails."""
         if kind == Kind.CONTROL_TICK:
             try:
                 tick = TICK_CDR.decode(payload)
@@ -63,7 +63,7 @@ class RunLog:
             self.unknown_kinds += 1
 
     def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
-        """Chain and write one tick; `tick` is the message of `payload` (None: it cannot be decoded)."""
+        """Chain and write one tick; `tick` is the decoded `payload` (None if it cannot be decoded)."""
         self._write(Message(TICK_TOPIC, time_ns + self._offset_ns, self.chain.link(payload)))
         if tick is None:
             self.undecodable += 1
@@ -72,11 +72,11 @@ class RunLog:
             self._write(derived)
 
     def flush(self) -> None:
-        """Hand everything to the operating system."""
+        """Flush everything to the operating system."""
         self._log.flush()
 
     def finish(self, facts: dict[str, str]) -> None:
-        """Close the log with the facts known only now; idempotent."""
+        """Close the log, adding the facts known only at its end; idempotent."""
         own = {
             **self._seal.facts(),
             **self._config_seal,
@@ -88,12 +88,12 @@ class RunLog:
         self._log.finish({**own, **facts})
 
     def abandon(self) -> None:
-        """Close the file as it is, after an error of the disk; never raises."""
+        """Close the file unfinished, after a disk error; never raises."""
         self._log.abandon()
 
     def _write(self, message: Message) -> None:
         if not self._scene_written:
-            self._scene_written = True  # now, because only the first record says when the log starts
+            self._scene_written = True  # not earlier: the first record's time is the start of the log
             for first in self._derive.scene(message.log_time_ns):
                 self._write(first)
         if message.topic not in self._declared:
@@ -107,11 +107,11 @@ class RunLog:
     def _slider(self, kind: int, log_time_ns: int, payload: bytes) -> None:
         try:
             if kind == Kind.WORLD_STATE:
-                made = self._derive.world(STATE_CDR.decode(payload), log_time_ns)
+                derived = self._derive.world(STATE_CDR.decode(payload), log_time_ns)
             else:
-                made = self._derive.slider(payload, log_time_ns)
+                derived = self._derive.slider(payload, log_time_ns)
         except LogDamaged:
             self.undecodable += 1
             return
-        for message in made:
+        for message in derived:
             self._write(message)

@@ -1,7 +1,7 @@
-"""What a 3-D viewer needs of a rig: the robot and the object as primitives, the path, and where the object is.
+"""Topics for a 3-D viewer: the robot and the object as primitives, the path, and the object's pose.
 
-The base is drawn as a box of Clearpath's Ridgeback data sheet (0.960 x 0.793 x 0.296 m), the pusher as its ball, the
-object only where it is simulated (its shape is unknown otherwise).
+The base is drawn as a box with the dimensions in Clearpath's Ridgeback data sheet (0.960 x 0.793 x 0.296 m), the
+pusher as its contact ball, and the object only where it is simulated (otherwise its shape is unknown).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _PATH_STEP_M = 0.25
 
 
 def scene_messages(rig: RigConfig, log_time_ns: int) -> list[Message]:
-    """Return what is said once, at the start of a log: robot description, fixed frames, path."""
+    """Return the messages written once, at the start of a log: robot description, static frames, path."""
     header = Header(ros_time(log_time_ns), WORLD_FRAME)
     body = Header(header.stamp, BASE_FRAME)
     sensor = Transform(Vector3(*rig.frames.sensor_in_base_m), _quaternion(rig.frames.base_from_sensor))
@@ -52,7 +52,7 @@ def scene_messages(rig: RigConfig, log_time_ns: int) -> list[Message]:
 
 
 def slider_frame(pose: Pose, log_time_ns: int) -> Message:
-    """Return the object's frame for the 3-D view."""
+    """Return the object's frame on /tf."""
     header = Header(ros_time(log_time_ns), WORLD_FRAME)
     at = pose.position
     placed = Transform(Vector3(at.x, at.y, at.z), pose.orientation)
@@ -60,12 +60,12 @@ def slider_frame(pose: Pose, log_time_ns: int) -> Message:
 
 
 def slider_pose(pose: Pose, log_time_ns: int) -> Message:
-    """Return /slider/pose for the world's truth."""
+    """Return the simulated ground-truth pose on /slider/pose."""
     return message("/slider/pose", log_time_ns, PoseStamped(Header(ros_time(log_time_ns), WORLD_FRAME), pose))
 
 
 def urdf(rig: RigConfig) -> str:
-    """Return the robot description: boxes, cylinders and a sphere, in the frames of /tf."""
+    """Return the robot description as URDF: boxes, cylinders and a sphere, in the frames of /tf."""
     height = _BASE_SIZE_M[2]
     links = [
         f'<link name="{WORLD_FRAME}"/>',

@@ -1,4 +1,4 @@
-"""The topics that people plot, made from `/control/tick`: a pure view of what the tick holds, for ROS tools.
+"""Derive the topics people plot from `/control/tick`, for ROS tools; a pure function of the ticks.
 
 Header stamps and log times are wall time in ns: the tick's CLOCK_MONOTONIC times plus the run's offset.
 """
@@ -51,7 +51,7 @@ _INFO, _WARN, _ERROR = 20, 30, 40
 
 
 class Message(NamedTuple):
-    """A message to be written: topic, log time in ns since 1970, payload."""
+    """An encoded message: topic, log time in ns since 1970, payload."""
 
     topic: str
     log_time_ns: int
@@ -64,10 +64,10 @@ def message(topic: str, log_time_ns: int, value: Any) -> Message:
 
 
 class TickTopics:
-    """Derives the other topics from ticks that come in order; remembers only what was said last."""
+    """Derives the other topics from ticks given in order; remembers only the last state reported."""
 
     def __init__(self, wall_offset_ns: int, names: tuple[str, str, str]) -> None:
-        """names: what the sensor, the arm and the base are called."""
+        """names: names of the sensor, the arm and the base."""
         self._offset_ns = wall_offset_ns
         self._names = names
         self._faults: tuple[str, ...] = ()
@@ -76,7 +76,7 @@ class TickTopics:
         self._diagnosed_ns: int | None = None
 
     def expand(self, tick: ControlTick) -> list[Message]:
-        """Return the messages of one tick, raw samples first."""
+        """Return the messages derived from one tick, raw samples first."""
         inp, out = tick.input, tick.output
         now_ns = inp.now_ns + self._offset_ns
         header = Header(ros_time(now_ns), WORLD_FRAME)
@@ -130,18 +130,18 @@ class TickTopics:
         faults, self._faults, known = tick.output.faults, tick.output.faults, self._faults
         if faults == known and before == after:
             return []
-        said = []
+        events = []
         for fault in faults:
             if fault not in known:
                 row = FAULTS.get(fault)
-                said.append(("fault", fault, row.text if row else fault, _ERROR if row and row.mode else _WARN))
+                events.append(("fault", fault, row.text if row else fault, _ERROR if row and row.mode else _WARN))
         for fault in known:
             if fault not in faults:
-                said.append(("cleared", fault, f"over: {FAULTS[fault].text if fault in FAULTS else fault}", _INFO))
+                events.append(("cleared", fault, f"over: {FAULTS[fault].text if fault in FAULTS else fault}", _INFO))
         if before != after:
-            said.append(("mode", "", f"{_mode(before)} -> {_mode(after)}", _WARN if after > Mode.PUSHING else _INFO))
+            events.append(("mode", "", f"{_mode(before)} -> {_mode(after)}", _WARN if after > Mode.PUSHING else _INFO))
         messages = []
-        for kind, fault, text, level in said:
+        for kind, fault, text, level in events:
             event = SafetyEvent(header, tick.input.tick, kind, fault, text, before, after)
             messages.append(message("/safety/event", now_ns, event))
             line = f"{fault} {text}".strip()

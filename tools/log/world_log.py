@@ -1,4 +1,4 @@
-"""The world's records as ring records of the log."""
+"""Encode records of the simulated world as ring records of the log."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from robot_io.log.world_messages import (
 WorldRecord = WorldStart | WorldCommand | WorldState | WorldStall
 
 
-def encoded(record: WorldRecord) -> tuple[Kind, int, bytes]:
-    """Return kind, time (ns) and payload of a record."""
+def encode_record(record: WorldRecord) -> tuple[Kind, int, bytes]:
+    """Return the kind, time (ns) and payload of a record."""
     if isinstance(record, WorldState):
         return Kind.WORLD_STATE, record.t_ns, STATE_CDR.encode(record)
     if isinstance(record, WorldCommand):
@@ -30,10 +30,10 @@ def encoded(record: WorldRecord) -> tuple[Kind, int, bytes]:
     return Kind.WORLD_STALL, record.t_ns, STALL_CDR.encode(record)
 
 
-def into(push: Callable[[int, int, bytes], object]) -> Callable[[WorldRecord], None]:
+def ring_listener(push: Callable[[int, int, bytes], object]) -> Callable[[WorldRecord], None]:
     """Return a listener for `World(on_record=...)` that pushes each record."""
 
     def listen(record: WorldRecord) -> None:
-        push(*encoded(record))
+        push(*encode_record(record))
 
     return listen

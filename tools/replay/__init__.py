@@ -1,1 +1,1 @@
-"""Folding a log again and comparing every bit."""
+"""Re-running the ticks of a log and comparing every byte."""

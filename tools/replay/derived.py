@@ -1,7 +1,7 @@
-"""Derives again what the recorder derived, and compares every byte, whatever order the log was brought into since.
+"""Recompute the derived topics of a log and compare every byte, even if the log has been reordered since.
 
-What is derived and what the log holds must be the same messages. Each one waits here until its twin comes, which in a
-log as it was written is at once; at the end none may be left over.
+The derived messages and those in the log must be the same. Each message waits here for its counterpart, which in a log
+in its original order follows at once; at the end none may be left.
 """
 
 from __future__ import annotations
@@ -22,141 +22,141 @@ from robot_io.tick import ControlTick
 from tools.log.derivation import SLIDER_TOPIC, TICK_TOPIC, WORLD_TOPIC, Derivation
 from tools.log.tick_topics import Message
 from tools.replay.difference import Difference
-from tools.replay.payloads import is_todays, same, where_they_differ
+from tools.replay.payloads import is_current_type, payload_difference, payloads_equal
 
 SCENE = ("/robot_description", "/tf_static", "/path")
 EVENTS, ROSOUT = "/safety/event", "/rosout"
 MOST_WAITING = 100_000
-"""Places with messages without their twin, about 50 MB: beyond it a log is taken to differ."""
-Place = tuple[int, str]
+"""Keys with messages still waiting, about 50 MB; beyond this the log is reported as different."""
+Key = tuple[int, str]
 """Log time in ns, and topic."""
 
 
 class DerivedReplay(msgspec.Struct, frozen=True):
-    """How the derived topics compared. Of `first_difference`, `tick` is the message's log time in ns."""
+    """How the derived topics compared. In `first_difference`, `tick` is the message's log time in ns."""
 
     messages: int
     identical: int
     first_difference: Difference | None
     not_compared: tuple[str, ...]
-    """Topics whose messages have another form or meaning today."""
+    """Topics whose messages have a different type or meaning today."""
 
 
 class Waiting(NamedTuple):
-    """A message without its twin: derived and not yet seen, or seen and not yet derived."""
+    """A message without its counterpart: derived but not yet seen, or seen but not yet derived."""
 
     payload: bytes
     derived: bool
 
 
 class DerivedReplayer:
-    """Takes all messages of one log, in any order in which the ticks come one after another."""
+    """Compares all messages of one log; only the ticks must be in order."""
 
     def __init__(
         self,
         rig: RigConfig,
         wall_offset_ns: int,
         channels: Iterable[ChannelInfo],
-        its_format: int,
+        log_format_number: int,
         tolerance: float | None = None,
     ) -> None:
         self._derive = Derivation(rig, wall_offset_ns)
         self._tolerance = tolerance
         compared = {channel.topic for channel in DERIVED} | {EVENTS, ROSOUT}
-        if not self._derive.slider_is_seen:
+        if not self._derive.slider_is_tracked:
             compared.add(SLIDER_TOPIC)
-        other = {channel.topic for channel in channels if not is_todays(channel)}
-        other |= {topic for topic, last_format in log_format.CHANGED_TOPICS if its_format <= last_format}
+        other = {channel.topic for channel in channels if not is_current_type(channel)}
+        other |= {topic for topic, last_format in log_format.CHANGED_TOPICS if log_format_number <= last_format}
         self._not_compared, self._compared = compared & other, compared - other
-        self._waiting: dict[Place, list[Waiting]] = {}
+        self._waiting: dict[Key, list[Waiting]] = {}
         self._newest: dict[str, list[Message]] = {}
-        self._scene_made = self._too_many = False
+        self._scene_derived = self._too_many = False
         self._failed: Difference | None = None
-        self._seen = self._twins = 0
+        self._seen = self._matched = 0
 
     def tick(self, tick: ControlTick, log_time_ns: int) -> None:
-        """Derive what comes of a tick."""
+        """Derive the messages of a tick."""
         self._expect(TICK_TOPIC, log_time_ns, lambda: self._derive.tick(tick))
 
     def world(self, state: WorldState, log_time_ns: int) -> None:
-        """Derive what comes of a state of the world."""
+        """Derive the messages of a state of the simulated world."""
         self._expect(WORLD_TOPIC, log_time_ns, lambda: self._derive.world(state, log_time_ns))
 
     def seen(self, topic: str, log_time_ns: int, payload: bytes) -> None:
         """Take a message of any other topic."""
-        if topic == SLIDER_TOPIC and self._derive.slider_is_seen:
+        if topic == SLIDER_TOPIC and self._derive.slider_is_tracked:
             self._expect(SLIDER_TOPIC, log_time_ns, lambda: self._derive.slider(payload, log_time_ns))
-        if topic not in self._compared or (topic == EVENTS and _is_of_the_gate(payload)):
+        if topic not in self._compared or (topic == EVENTS and _is_gate_event(payload)):
             return
-        if topic in SCENE and not self._scene_made:
-            self._scene_made = True  # by the first record's time, which only these messages hold
+        if topic in SCENE and not self._scene_derived:
+            self._scene_derived = True  # derived from the first record's time, which only these messages hold
             self._expect(topic, log_time_ns, lambda: self._derive.scene(log_time_ns))
         self._seen += 1
         self._take((log_time_ns, topic), payload, derived=False)
 
     def result(self, *, complete: bool) -> DerivedReplay:
-        """Return how it compared. What comes of the newest records may be lost with the end of a log."""
+        """Return the comparison. In an incomplete log, messages derived from its newest records may be missing."""
         if not complete:
-            for made in self._newest.values():
-                for topic, log_time_ns, payload in made:
+            for derived in self._newest.values():
+                for topic, log_time_ns, payload in derived:
                     self._forget((log_time_ns, topic), payload)
         first = self._failed
         if self._waiting and not self._too_many:
-            place = min(self._waiting)
-            if first is None or place[0] < first.tick:
-                first = _named(place, self._waiting[place])
-        if not self._scene_made and self._compared >= set(SCENE):
+            key = min(self._waiting)
+            if first is None or key[0] < first.tick:
+                first = _difference_at(key, self._waiting[key])
+        if not self._scene_derived and self._compared >= set(SCENE):
             first = first or Difference(0, SCENE[0], "no message", "one, at the start")
-        return DerivedReplay(self._seen, self._twins, first, tuple(sorted(self._not_compared)))
+        return DerivedReplay(self._seen, self._matched, first, tuple(sorted(self._not_compared)))
 
     def _expect(self, source: str, log_time_ns: int, derive: Callable[[], list[Message]]) -> None:
         try:
-            made = [message for message in derive() if message.topic in self._compared]
+            derived = [message for message in derive() if message.topic in self._compared]
         except Exception as error:  # nothing in a log may crash its replay
             what = f"{type(error).__name__}: {error}"
-            self._failed = self._failed or Difference(log_time_ns, f"what comes of {source}", "messages", what)
+            self._failed = self._failed or Difference(log_time_ns, f"derived from {source}", "messages", what)
             return
-        self._newest[source] = made
-        for topic, its_time_ns, payload in made:
-            self._take((its_time_ns, topic), payload, derived=True)
+        self._newest[source] = derived
+        for topic, message_time_ns, payload in derived:
+            self._take((message_time_ns, topic), payload, derived=True)
 
-    def _take(self, place: Place, payload: bytes, *, derived: bool) -> None:
-        """Find the twin of a message, or let it wait."""
-        waiting = self._waiting.get(place, ())
+    def _take(self, key: Key, payload: bytes, *, derived: bool) -> None:
+        """Match a message with its counterpart, or let it wait."""
+        waiting = self._waiting.get(key, ())
         for i, other in enumerate(waiting):
-            if other.derived != derived and same(place[1], payload, other.payload, self._tolerance):
-                self._drop(place, i)
-                self._twins += 1
+            if other.derived != derived and payloads_equal(key[1], payload, other.payload, self._tolerance):
+                self._drop(key, i)
+                self._matched += 1
                 return
         if len(self._waiting) < MOST_WAITING:
-            self._waiting.setdefault(place, []).append(Waiting(payload, derived))
+            self._waiting.setdefault(key, []).append(Waiting(payload, derived))
         elif not self._too_many:
             self._too_many = True
-            what = f"more than {MOST_WAITING} messages far from what they come of"
-            self._failed = Difference(place[0], place[1], what, "each beside it")
+            what = f"more than {MOST_WAITING} messages far from the records they are derived from"
+            self._failed = Difference(key[0], key[1], what, "each next to its record")
 
-    def _forget(self, place: Place, payload: bytes) -> None:
-        for i, other in enumerate(self._waiting.get(place, ())):
+    def _forget(self, key: Key, payload: bytes) -> None:
+        for i, other in enumerate(self._waiting.get(key, ())):
             if other == (payload, True):
-                self._drop(place, i)
+                self._drop(key, i)
                 return
 
-    def _drop(self, place: Place, index: int) -> None:
-        waiting = self._waiting[place]
+    def _drop(self, key: Key, index: int) -> None:
+        waiting = self._waiting[key]
         del waiting[index]
         if not waiting:
-            del self._waiting[place]
+            del self._waiting[key]
 
 
-def _is_of_the_gate(payload: bytes) -> bool:
-    """Return whether an event is the gate's own word, which came in and was not derived."""
+def _is_gate_event(payload: bytes) -> bool:
+    """Return whether the gate itself reported an event: that is an input, not derived."""
     try:
         return SAFETY_EVENT.decode(payload).text.startswith(GATE_SAYS)
     except LogDamaged:
         return False
 
 
-def _named(place: Place, waiting: list[Waiting]) -> Difference:
-    mine = next((one.payload for one in waiting if one.derived), None)
+def _difference_at(key: Key, waiting: list[Waiting]) -> Difference:
+    replayed = next((one.payload for one in waiting if one.derived), None)
     logged = next((one.payload for one in waiting if not one.derived), None)
-    return where_they_differ(*place, logged, mine)
+    return payload_difference(*key, logged, replayed)

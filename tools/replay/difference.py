@@ -1,4 +1,4 @@
-"""Where a log and its replay differ first: the field by its dotted name, and both values."""
+"""Find the first difference between a log and its replay: the field's dotted name and both values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import msgspec
 
 
 class Difference(msgspec.Struct, frozen=True):
-    """The first place where replay and log differ; of the world, `tick` is the time of the state in ns."""
+    """The first difference between log and replay; for the simulated world, `tick` is the time of the state in ns."""
 
     tick: int
     field: str
@@ -20,13 +20,13 @@ class Difference(msgspec.Struct, frozen=True):
 
 
 def difference(
-    tick: int, logged: Any, mine: Any, tolerance: float | None, passed_over: frozenset[str] = frozenset()
+    tick: int, logged: Any, replayed: Any, tolerance: float | None, ignored: frozenset[str] = frozenset()
 ) -> Difference | None:
-    """Return the first leaf that differs: by a bit (-0.0 is not 0.0, NaN equals NaN), or by more than `tolerance`.
+    """Return the first leaf that differs: in any bit (-0.0 is not 0.0, NaN equals NaN), or by more than `tolerance`.
 
-    passed_over: dotted paths of fields, those in elements of arrays without their index.
+    ignored: dotted paths of fields to skip, without array indexes.
     """
-    for name, old, new in _leaves(logged, mine, passed_over):
+    for name, old, new in _leaves(logged, replayed, ignored):
         if isinstance(old, float) and isinstance(new, float):
             same = _same_bits(old, new) if tolerance is None else _close(old, new, tolerance)
         else:
@@ -45,18 +45,18 @@ def _close(old: float, new: float, tolerance: float) -> bool:
 
 
 def _leaves(
-    logged: Any, mine: Any, passed_over: frozenset[str], name: str = "", path: str = ""
+    logged: Any, replayed: Any, ignored: frozenset[str], name: str = "", path: str = ""
 ) -> Iterator[tuple[str, Any, Any]]:
     """Yield (dotted name, logged, replayed) of every leaf; `path` is the name without indexes."""
-    if path in passed_over:
+    if path in ignored:
         return
-    if isinstance(logged, msgspec.Struct) and isinstance(mine, msgspec.Struct):
+    if isinstance(logged, msgspec.Struct) and isinstance(replayed, msgspec.Struct):
         for key in logged.__struct_fields__:
             dot = "." if name else ""
-            inner = getattr(logged, key), getattr(mine, key)
-            yield from _leaves(*inner, passed_over, f"{name}{dot}{key}", f"{path}{dot}{key}")
-    elif isinstance(logged, tuple) and isinstance(mine, tuple) and len(logged) == len(mine):
-        for i, (old, new) in enumerate(zip(logged, mine, strict=True)):
-            yield from _leaves(old, new, passed_over, f"{name}[{i}]", path)
+            inner = getattr(logged, key), getattr(replayed, key)
+            yield from _leaves(*inner, ignored, f"{name}{dot}{key}", f"{path}{dot}{key}")
+    elif isinstance(logged, tuple) and isinstance(replayed, tuple) and len(logged) == len(replayed):
+        for i, (old, new) in enumerate(zip(logged, replayed, strict=True)):
+            yield from _leaves(old, new, ignored, f"{name}[{i}]", path)
     else:
-        yield name, logged, mine
+        yield name, logged, replayed

@@ -1,4 +1,4 @@
-"""Payloads of topics that are of today's type: whether two are the same, and where they differ."""
+"""Compare payloads of topics that still have today's type."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from robot_io.mcap.read import ChannelInfo
 from tools.replay.difference import Difference, difference
 
 
-def is_todays(channel: ChannelInfo) -> bool:
-    """Return whether a topic of a log has today's type, or is none of this program's topics."""
+def is_current_type(channel: ChannelInfo) -> bool:
+    """Return whether a log's topic has today's type, or is not one of this program's topics."""
     known = BY_TOPIC.get(channel.topic)
     if known is None:
         return True
     return (channel.schema_name, channel.schema_text) == (known.cdr_type.name, known.cdr_type.schema_text)
 
 
-def same(topic: str, one: bytes, other: bytes, tolerance: float | None) -> bool:
-    """Return whether two payloads are equal: every byte, or, with a tolerance, every number that close."""
+def payloads_equal(topic: str, one: bytes, other: bytes, tolerance: float | None) -> bool:
+    """Return whether two payloads are equal: in every byte, or, with a tolerance, in every number to within it."""
     if one == other or tolerance is None:
         return one == other
     cdr_type = BY_TOPIC[topic].cdr_type
@@ -27,14 +27,14 @@ def same(topic: str, one: bytes, other: bytes, tolerance: float | None) -> bool:
         return False
 
 
-def where_they_differ(log_time_ns: int, topic: str, logged: bytes | None, mine: bytes | None) -> Difference:
-    """Name the field that differs, or which of the two is not there."""
-    if logged is None or mine is None:
-        found = ("a message", "none") if mine is None else ("no message", "one")
+def payload_difference(log_time_ns: int, topic: str, logged: bytes | None, replayed: bytes | None) -> Difference:
+    """Return the field that differs, or which of the two is missing."""
+    if logged is None or replayed is None:
+        found = ("a message", "none") if replayed is None else ("no message", "one")
         return Difference(log_time_ns, topic, *found)
     cdr_type = BY_TOPIC[topic].cdr_type
     try:
-        leaf = difference(log_time_ns, cdr_type.decode(logged), cdr_type.decode(mine), None)
+        leaf = difference(log_time_ns, cdr_type.decode(logged), cdr_type.decode(replayed), None)
     except LogDamaged:
         leaf = None
     if leaf is None:

@@ -1,4 +1,4 @@
-"""A log that is checked while it is read: its chain of ticks, their times, and the seal at its end."""
+"""Read a log while verifying it: its chain of ticks, their times, and the seal at its end."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from robot_io.rig.logged import rig_of_log
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.log.derivation import TICK_TOPIC
 from tools.log.run_log import OFFSET_FACT
-from tools.replay.made_by import MadeBy, made_by
+from tools.replay.code_origin import CodeOrigin, compare_code
 from tools.run.code_facts import code_facts
 
 MessageT = TypeVar("MessageT", bound=msgspec.Struct)
-DO_DAMAGED = "Do not trust this log from there on; `push log info` shows what it holds"
+DO_DAMAGED = "Do not trust this log from there on; `push log info` shows what it contains"
 
 
 class Item(NamedTuple):
-    """One message; `tick` is the decoded one of `/control/tick`."""
+    """One message; `tick` is its decoded value on `/control/tick`."""
 
     topic: str
     log_time_ns: int
@@ -39,44 +39,44 @@ class Item(NamedTuple):
 
 
 class VerifiedLog:
-    """The rig and facts of a log, after every checksum of the file was verified, and then its messages.
+    """The rig and facts of a log, available once every checksum of the file is verified, and its messages.
 
-    Raises UsageError when it cannot be opened or is of a later format, LogDamaged when it cannot be trusted.
+    Raises UsageError if it cannot be opened or is of a later format, LogDamaged if it cannot be trusted.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         summary = read_summary(path)
         if summary.library != LIBRARY and CONFIG_ATTACHMENT not in summary.attachments:
-            what = f"this is not the log of a push: it holds no {CONFIG_ATTACHMENT}"
+            what = f"this is not the log of a push: it contains no {CONFIG_ATTACHMENT}"
             raise LogDamaged(what, where=str(path), do="Give the run.mcap of a `push run`")
         self._end = summary.metadata.get(END_METADATA)
         self._saved = summary.metadata.get(RECOVERED_METADATA)
         self.facts = summary.metadata.get(RUN_METADATA, {})
         self.channels = summary.channels
-        self.made_by: MadeBy = made_by(self.facts, code_facts(), format_of(self.facts, str(path)))
+        self.made_by: CodeOrigin = compare_code(self.facts, code_facts(), format_of(self.facts, str(path)))
         try:
             self.ticks = self.type_of(TICK_TOPIC, TICK_CDR)
         except LogDamaged as error:
             raise self._damaged(error.what) from None
-        self.config_holds = self._seal_of_config_holds(summary)
-        """Return whether config.toml is the one that the log was finished with."""
+        self.config_intact = self._is_config_intact(summary)
+        """Whether config.toml is unchanged since the log was finished."""
         self.notes: tuple[str, ...] = ()
-        """What of the config means nothing today, and what is not sealed."""
+        """Config settings that have no meaning today, and parts of the log that the seal does not cover."""
         self._rig = self._read_rig(summary)
         if self._end is None and self._saved is None:
-            raise self._damaged("the log does not say how it ends")
+            raise self._damaged("the log has no end record")
 
     def usable_rig(self) -> RigConfig:
-        """Return the rig. Raises ReplayDiffers when only the code that made the log could use it, LogDamaged first."""
+        """Return the rig. Raises LogDamaged, or ReplayDiffers if only the code that wrote the log can use its rig."""
         if isinstance(self._rig, RigConfig):
             return self._rig
-        for _ in self.messages():  # damage first
+        for _ in self.messages():  # report damage first
             continue
         raise ReplayDiffers(
             f"{self.made_by.cause}: its {CONFIG_ATTACHMENT} cannot be used today: {self._rig}",
             where=str(self.path),
-            do="Replay it with the code that made it",
+            do="Replay it with the code that wrote it",
         )
 
     @property
@@ -85,7 +85,7 @@ class VerifiedLog:
 
     @property
     def complete(self) -> bool:
-        """Return whether the end is there; what was recovered of a truncated log has none."""
+        """Return whether the log has its end; a recovered log does not."""
         return self._end is not None
 
     @property
@@ -95,23 +95,23 @@ class VerifiedLog:
 
     @property
     def wall_offset_ns(self) -> int:
-        """What was added to the times of ticks to get their log times; 0 when the log does not say it."""
-        said = self.facts.get(OFFSET_FACT, "")
-        return int(said) if said.removeprefix("-").isdecimal() and len(said) < 25 else 0
+        """Offset added to tick times to get log times, in ns; 0 if the log does not record it."""
+        text = self.facts.get(OFFSET_FACT, "")
+        return int(text) if text.removeprefix("-").isdecimal() and len(text) < 25 else 0
 
     def type_of(self, topic: str, today: CdrType[MessageT]) -> LoggedType[MessageT]:
-        """Return how the log's messages of a topic are read as today's. Raises LogDamaged when they cannot be."""
+        """Return how to read the log's messages of a topic as today's type. Raises LogDamaged if they cannot be."""
         for channel in self.channels:
             if channel.topic == topic:
                 return LoggedType(today, channel.schema_name, channel.schema_text, self.made_by.format)
         return LoggedType(today, today.name, today.schema_text, self.made_by.format)
 
     def dropped(self, ring: str) -> bool:
-        """Return whether records of a ring are known to be missing, because it was full."""
+        """Return whether records are known to be missing because a ring was full."""
         return (self._end or {}).get(f"dropped_{ring}", "0") != "0"
 
     def messages(self) -> Iterator[Item]:
-        """Yield every message in the order of the file. Take all before trusting any: the end may raise LogDamaged."""
+        """Yield every message in file order. Read all before trusting any: the end may raise LogDamaged."""
         chain, seal = TickChain(), seal_of(self._end_facts, self.made_by.format)
         for channel in self.channels:
             seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
@@ -125,28 +125,28 @@ class VerifiedLog:
             yield Item(message.topic, message.log_time_ns, message.payload, tick)
         self._check_end(chain, seal, last)
 
-    def _seal_of_config_holds(self, summary: LogSummary) -> bool:
+    def _is_config_intact(self, summary: LogSummary) -> bool:
         if self._end_facts and self.made_by.format == 1 and CONFIG_FACT not in self._end_facts:
-            return True  # it was not sealed then, as the notes say
+            return True  # format 1 did not seal it, as the notes say
         return (
             self._end_facts.get(CONFIG_FACT)
             == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
         )
 
     def _read_rig(self, summary: LogSummary) -> RigConfig | str:
-        """Return the rig, or why today's program cannot use it though the log is whole."""
+        """Return the rig, or why today's program cannot use it although the log is intact."""
         try:
             rig, notes = rig_of_log(summary.attachments[CONFIG_ATTACHMENT].decode(), self.made_by.format)
         except (KeyError, UnicodeDecodeError, RecursionError, PushError) as error:
             why = "it is missing" if isinstance(error, KeyError) else " ".join(str(error).split())
-            if self.config_holds and self.made_by.other and isinstance(error, PushError):
+            if self.config_intact and self.made_by.other and isinstance(error, PushError):
                 return why
-            raise self._damaged(f"the log holds no usable {CONFIG_ATTACHMENT}: {why}") from None
+            raise self._damaged(f"the log contains no usable {CONFIG_ATTACHMENT}: {why}") from None
         self.notes = (*self._seal_notes(), *notes)
         return rig
 
     def _seal_notes(self) -> list[str]:
-        """Return what of a log of the first format was never sealed."""
+        """Return what the seal of a log of the first format does not cover."""
         if self.made_by.format > 1 or "message_sum" in self._end_facts:
             return []
         what = "types and times of messages" if "payload_sum" in self._end_facts else "messages but ticks"
@@ -155,19 +155,21 @@ class VerifiedLog:
     def _tick(self, message: LogMessage, last: int, chained: bool) -> ControlTick:
         if not chained:
             named = "the first tick" if last < 0 else f"tick {last} or {last + 1}"
-            raise self._damaged(f"{named} was altered, or ticks are missing there: the chain of checksums breaks")
+            raise self._damaged(f"{named} was altered, or ticks are missing there: the chain of checksums is broken")
         try:
             tick = self.ticks.decode(message.payload)
         except LogDamaged as error:
             named = "the first tick" if last < 0 else f"tick {last + 1}"
             raise self._damaged(f"{named} was altered: {error.what}") from None
         if self.facts.get(OFFSET_FACT) != str(message.log_time_ns - tick.input.now_ns):
-            raise self._damaged(f"tick {tick.input.tick} was altered: its time in the log is not its own")
+            raise self._damaged(f"tick {tick.input.tick} was altered: its log time does not match its content")
         return tick
 
     def _check_end(self, chain: TickChain, seal: LogSeal | PayloadSeal, last: int) -> None:
         if chain.ticks == 0:
-            raise LogDamaged("the log holds no tick", where=str(self.path), do="The run ended before its loop began")
+            raise LogDamaged(
+                "the log contains no ticks", where=str(self.path), do="The run ended before its loop started"
+            )
         wanted = self._end_facts
         if self._end is not None:
             ticks = {"ticks": str(chain.ticks), "last_tick_crc32": f"{chain.crc32:08x}"}
@@ -175,14 +177,14 @@ class VerifiedLog:
                 raise self._damaged(f"tick {last}, the last one, was altered or ticks are missing")
         if any(wanted.get(name) != value for name, value in seal.facts().items()):
             raise self._damaged(
-                f"messages or their types were changed, lost or added after it was finished "
-                f"({seal.messages} are there, {wanted.get('messages', 'an unknown number')} were written)"
+                f"messages or their types were changed, lost or added after the log was finished "
+                f"({seal.messages} are present, {wanted.get('messages', 'an unknown number')} were written)"
             )
 
     def require_config(self) -> None:
-        """Raise LogDamaged unless `config_holds`."""
-        if not self.config_holds:
-            raise self._damaged(f"its {CONFIG_ATTACHMENT} was changed after it was finished")
+        """Raise LogDamaged if config.toml was changed."""
+        if not self.config_intact:
+            raise self._damaged(f"its {CONFIG_ATTACHMENT} was changed after the log was finished")
 
     def _damaged(self, what: str) -> LogDamaged:
         return LogDamaged(what, where=str(self.path), do=DO_DAMAGED)

@@ -1,4 +1,4 @@
-"""Runs the simulated world of a log again: fed with the commands that arrived then, it must come out bit for bit."""
+"""Re-run the simulated world of a log: given the same commands, its states must match bit for bit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class WorldReplay(msgspec.Struct, frozen=True):
 
 
 class WorldTypes(NamedTuple):
-    """How a log's records of the world are read."""
+    """How to read a log's records of the world."""
 
     start: LoggedType[WorldStart]
     command: LoggedType[WorldCommand]
@@ -34,22 +34,22 @@ class WorldTypes(NamedTuple):
 
 
 class WorldReplayer:
-    """Takes the world's records in the order of the log."""
+    """Compares the world's records, given in the order of the log."""
 
     def __init__(self, rig: RigConfig, types: WorldTypes, tolerance: float | None = None) -> None:
         self._rig = rig
         self._types = types
         self._tolerance = tolerance
         self._world: World | None = None
-        self._made: deque[WorldState] = deque()
+        self._replayed: deque[WorldState] = deque()
         self._states = self._identical = 0
         self._first: Difference | None = None
 
     def take(self, topic: str, payload: bytes) -> None:
-        """Take one record. Raises LogDamaged when it cannot be read."""
+        """Take one record. Raises LogDamaged if it cannot be decoded."""
         if topic == "/world/start":
             start = self._types.start.decode(payload)
-            self._made.clear()
+            self._replayed.clear()
             self._world = World(self._rig, start.seed, start.start_ns, self._keep)
         elif self._world is None:
             return
@@ -59,12 +59,12 @@ class WorldReplayer:
             self._compare(self._world, payload)
 
     def result(self) -> WorldReplay | None:
-        """Return how it compared; None when the log holds no world."""
+        """Return the comparison; None if the log contains no world."""
         return None if self._world is None else WorldReplay(self._states, self._identical, self._first)
 
     def _keep(self, record: WorldRecord) -> None:
         if isinstance(record, WorldState):
-            self._made.append(record)
+            self._replayed.append(record)
 
     def _command(self, world: World, payload: bytes) -> None:
         command = self._types.command.decode(payload)
@@ -73,24 +73,24 @@ class WorldReplayer:
                 world.set_drivers(command.drivers_active, command.arrival_ns)
             else:
                 world.command_base(command.twist, command.arrival_ns)
-        except ValueError as error:  # no world has ever said this: the record was altered
+        except ValueError as error:  # no world can have written this: the record was altered
             self._first = self._first or Difference(command.arrival_ns, "arrival_ns", command.arrival_ns, str(error))
 
     def _compare(self, world: World, payload: bytes) -> None:
-        if not self._made:  # by its own clock, never by a time in the log, which could ask for an endless run
+        if not self._replayed:  # by the world's own clock: a time from the log could demand an endless run
             world.advance_to(world.now_ns + STATE_EVERY_STEPS * GRID_NS)
-        mine = self._made.popleft()
+        replayed = self._replayed.popleft()
         self._states += 1
         found = None
-        if not self._types.state.exact or not _is(mine, payload):
+        if not self._types.state.exact or not _matches(replayed, payload):
             logged = self._types.state.decode(payload)
-            found = difference(mine.t_ns, logged, mine, self._tolerance, self._types.state.missing)
+            found = difference(replayed.t_ns, logged, replayed, self._tolerance, self._types.state.missing)
         self._identical += found is None
         self._first = self._first or found
 
 
-def _is(state: WorldState, payload: bytes) -> bool:
+def _matches(state: WorldState, payload: bytes) -> bool:
     try:
         return STATE_CDR.encode(state) == payload
-    except ValueError:  # it began at the end of all times
+    except ValueError:  # its times exceed what CDR can encode
         return False

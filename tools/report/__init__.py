@@ -1,1 +1,1 @@
-"""What a log looks like to people: series, figures, words, one page."""
+"""The report of a run, made from its log: figures, tables and one HTML page."""

@@ -1,4 +1,4 @@
-"""Columns of a log that fit into memory however long the log is: thinned evenly, or counted in bins."""
+"""Collect columns of a log of any length in bounded memory: thinned evenly, or counted in bins."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BIGGEST = 1e9
-"""Larger numbers, and those that are not finite, become NaN: no quantity of a log is as large, and no axis bears it."""
+"""Larger or non-finite numbers become NaN: no quantity in a log is that large, and no axis could show it."""
 
 
 MOST_SPANS = 2000
 
 
 class Series:
-    """Rows of floats, at most `limit` of them: when full, every other row is dropped and then left out.
+    """Rows of floats, at most `limit` of them: when full, every other row is dropped, and the sampling rate is halved.
 
-    Ask `wants()` once per sample, in order, before the work of making its row.
+    Call `wants()` once per sample, in order, before computing its row.
     """
 
     def __init__(self, columns: Sequence[str], limit: int = 60_000) -> None:
@@ -50,16 +50,16 @@ class Series:
 
     def arrays(self) -> dict[str, Floats]:
         """Return the columns by name, each of shape (rows,)."""
-        made = {}
+        arrays = {}
         for name, column in zip(self.names, self._columns, strict=True):
             values = np.array(column, dtype=np.float64)
             values[~(np.abs(values) < BIGGEST)] = np.nan
-            made[name] = values
-        return made
+            arrays[name] = values
+        return arrays
 
 
 class Tally:
-    """Counts of non-negative times in bins of 10 us up to 1 s, and the exact greatest."""
+    """Histogram of non-negative times in bins of 10 us up to 1 s, with the exact maximum."""
 
     BIN_MS = 0.01
     _BINS = 100_000
@@ -70,7 +70,7 @@ class Tally:
         self._counts = array("Q", bytes(8 * (self._BINS + 1)))
 
     def add(self, time_ms: float) -> None:
-        """Count one time; what is not a number is left out."""
+        """Count one time; NaN and negative times are ignored."""
         if not time_ms >= 0.0:
             return
         self.total += 1
@@ -78,7 +78,7 @@ class Tally:
         self._counts[int(min(time_ms / self.BIN_MS, self._BINS))] += 1
 
     def percentile_ms(self, percent: float) -> float:
-        """Return the upper edge of the bin that holds the percentile (NaN when nothing was counted)."""
+        """Return the upper edge of the bin that holds the percentile (NaN if nothing was counted)."""
         if not self.total:
             return float("nan")
         sums = np.cumsum(np.array(self._counts, dtype=np.uint64))
@@ -86,14 +86,14 @@ class Tally:
         return min((index + 1) * self.BIN_MS, self.worst_ms)
 
     def counts_in(self, edges_ms: Floats) -> Floats:
-        """Return how many times lie between neighbouring edges (ms, rising), shape (edges - 1,)."""
+        """Return the number of times between neighbouring edges (ms, ascending), shape (edges - 1,)."""
         lows = np.arange(self._BINS + 1) * self.BIN_MS
         counts, _ = np.histogram(lows + self.BIN_MS / 2, bins=edges_ms, weights=np.array(self._counts, dtype=float))
         return counts.astype(np.float64)
 
 
 class Span(NamedTuple):
-    """Something that lasted: a fault (by its id) or a mode (by its number), in s since the first tick."""
+    """The duration of a fault (by its id) or a mode (by its number), in s since the first tick."""
 
     name: str
     text: str
@@ -102,14 +102,14 @@ class Span(NamedTuple):
 
 
 class Spans:
-    """Spans under way and over, bounded."""
+    """Open and finished spans, bounded in number."""
 
     def __init__(self) -> None:
         self._open: dict[str, Span] = {}
         self._done: list[Span] = []
 
     def begin(self, key: str, name: str, text: str, time_s: float) -> None:
-        """Begin a span under a key; the one under way there ends."""
+        """Begin a span under a key, ending any that is open there."""
         self.end(key, time_s)
         if len(self._done) + len(self._open) < MOST_SPANS:
             self._open[key] = Span(name, text, time_s, time_s)
@@ -121,7 +121,7 @@ class Spans:
             self._done.append(span._replace(end_s=time_s))
 
     def finish(self, end_s: float, zero_s: float) -> list[Span]:
-        """End what is under way at `end_s` and return all, in order, with times counted from `zero_s`."""
+        """End open spans at `end_s` and return all in order of their beginning, with times relative to `zero_s`."""
         for key in list(self._open):
             self.end(key, end_s)
         moved = [Span(name, text, begin - zero_s, end - zero_s) for name, text, begin, end in self._done]

@@ -1,4 +1,4 @@
-"""The figures of one run over time: force, speed, tracking, timing, safety. The plan view is in `plan_view.py`."""
+"""Draw one run over time: force, speed, tracking, timing, safety. The plan view is in `plan_view.py`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ MODE_COLOURS = {
 
 
 def figures(run: RunData) -> dict[str, bytes]:
-    """Return every figure of a run as PNG, by its name."""
+    """Return every figure of a run as PNG, by name."""
     drawn: dict[str, Callable[[RunData], Figure]] = {
         "trajectory": plan_view.trajectory,
         "force": force,
@@ -62,7 +62,7 @@ def figures(run: RunData) -> dict[str, bytes]:
 
 
 def force(run: RunData) -> Figure:
-    """Draw the force on the object, and how far the raw reading is from the limits (on a logarithmic scale)."""
+    """Draw the force on the object, and the raw reading against the limits (on a logarithmic scale)."""
     figure = new_panels(4.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     ticks, control, limits = run.ticks, run.rig.control, run.rig.limits
@@ -71,12 +71,14 @@ def force(run: RunData) -> Figure:
     size = np.hypot(ticks["force_x"], ticks["force_y"])
     for axes in (top, bottom):
         shade_phases(axes, ticks, named=axes is top)
-    top.plot(ticks["t_s"], size, color=BLUE, label="size, horizontal, filtered")
-    top.plot(ticks["t_s"], ticks["force_y"], color=PURPLE, linewidth=1.0, label="part to the left of the path")
+    top.plot(ticks["t_s"], size, color=BLUE, label="horizontal magnitude, filtered")
+    top.plot(ticks["t_s"], ticks["force_y"], color=PURPLE, linewidth=1.0, label="component to the left of the path")
     top.axhline(control.force_min_N, color=INK, linestyle=":", label=f"contact above {control.force_min_N:g} N")
     top.set_ylabel("force on the object (N)")
     _legend(top, 3)
-    bottom.semilogy(ticks["t_s"], np.maximum(ticks["force_raw"], FLOOR_N), color=GREY, linewidth=0.9, label="raw size")
+    bottom.semilogy(
+        ticks["t_s"], np.maximum(ticks["force_raw"], FLOOR_N), color=GREY, linewidth=0.9, label="raw magnitude"
+    )
     for value, colour, dashes, name in (
         (limits.max_force_N, VERMILLION, "-", "stop"),
         (limits.slow_force_N, ORANGE, "--", "slow"),
@@ -93,7 +95,7 @@ def force(run: RunData) -> Figure:
 
 
 def speed(run: RunData) -> Figure:
-    """Draw the speed of the base: wanted by the law, commanded after safety, measured by odometry."""
+    """Draw the speed of the base: requested by the law, commanded after safety, measured by odometry."""
     figure = new_panels(3.1)
     axes = figure.subplots()
     ticks = run.ticks
@@ -101,7 +103,9 @@ def speed(run: RunData) -> Figure:
         return _empty(figure, (axes,))
     shade_phases(axes, ticks, named=True)
     axes.plot(ticks["t_s"], ticks["speed_measured"], color=ORANGE, linewidth=2.6, label="measured (odometry)")
-    axes.plot(ticks["t_s"], ticks["speed_wanted"], color=INK, linewidth=1.0, linestyle="--", label="wanted by the law")
+    axes.plot(
+        ticks["t_s"], ticks["speed_wanted"], color=INK, linewidth=1.0, linestyle="--", label="requested by the law"
+    )
     axes.plot(ticks["t_s"], ticks["speed_command"], color=BLUE, linewidth=1.1, label="commanded, after safety")
     greatest = max(_greatest(ticks[name]) for name in ("speed_measured", "speed_wanted", "speed_command"))
     axes.set_ylim(-0.04 * max(greatest, 0.01), 1.3 * max(greatest, 0.01))
@@ -139,14 +143,14 @@ def tracking(run: RunData) -> Figure:
 
 
 def timing(run: RunData) -> Figure:
-    """Draw how late the ticks woke, and when ticks were skipped."""
+    """Draw how late the ticks started, and when ticks were skipped."""
     figure = new_panels(4.0, gap_in=0.55)
     top, bottom = figure.subplots(2, 1, height_ratios=(3, 1))
     late = run.late
     if not late.total:
         return _empty(figure, (top, bottom))
     if late.worst_ms == 0.0:
-        no_data(top, "no tick was late: this run had a virtual clock")
+        no_data(top, "no tick was late: this run used a virtual clock")
     else:
         wanted = np.geomspace(late.BIN_MS, max(late.worst_ms * 1.05, 1.0), 60)
         edges = np.unique(np.ceil(wanted / late.BIN_MS)) * late.BIN_MS
@@ -156,7 +160,7 @@ def timing(run: RunData) -> Figure:
         top.set_yscale("log")
         top.set_ylim(bottom=0.7)
         for value, colour, dashes, name in (
-            (late.percentile_ms(50), INK, ":", "half"),
+            (late.percentile_ms(50), INK, ":", "median"),
             (late.percentile_ms(99), BLUE, "--", "99 %"),
             (late.worst_ms, VERMILLION, "-", "worst"),
         ):
@@ -183,7 +187,7 @@ def timing(run: RunData) -> Figure:
 
 
 def safety(run: RunData) -> Figure:
-    """Draw the supervisor's mode and every fault over the time of the run."""
+    """Draw the supervisor's mode and every fault over time."""
     names = list(dict.fromkeys(span.name for span in run.faults))
     shown = names[:MOST_FAULT_ROWS]
     figure = new_figure(1.5 + 0.3 * len(shown))
@@ -221,7 +225,7 @@ def safety(run: RunData) -> Figure:
 
 
 def _bar(span: Span, length: float) -> tuple[float, float]:
-    """Return (begin, width) in s; what lasted one tick can still be seen."""
+    """Return (begin, width) in s, wide enough for a span of one tick to be visible."""
     return span.begin_s, max(span.end_s - span.begin_s, 0.003 * length)
 
 
@@ -229,12 +233,12 @@ def _empty(figure: Figure, panels: tuple[Axes, ...]) -> Figure:
     figure.set_figheight(1.5)
     for axes in panels:
         axes.set_axis_off()
-    no_data(panels[0], "the loop made no tick in this log")
+    no_data(panels[0], "this log contains no ticks")
     return figure
 
 
 def _legend(axes: Axes, columns: int) -> None:
-    """Put the legend into the upper right, and make room for it there."""
+    """Place the legend in the upper right, and make room for it."""
     low, high = axes.get_ylim()
     if axes.get_yscale() == "log":
         axes.set_ylim(low, high * (high / low) ** 0.3)
@@ -244,7 +248,7 @@ def _legend(axes: Axes, columns: int) -> None:
 
 
 def _at_least(axes: Axes, span: float) -> None:
-    """Keep an axis from blowing up what is next to nothing: it shows at least +-`span`."""
+    """Let an axis show at least +-`span`, so that it does not magnify negligible values."""
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -span), max(high, span))
 

@@ -1,7 +1,7 @@
-"""The end-of-run report: one self-contained HTML page made from a log alone.
+"""Write the end-of-run report: one self-contained HTML page made from a log alone.
 
-`python -m tools.report.page LOG HTML PARENT` is how `push run` makes it: a process of its own, so that a report
-that cannot be made is no failure of the run.
+`push run` runs `python -m tools.report.page LOG HTML PARENT` in a separate process, so that a failing report does not
+fail the run.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.mcap.walk import Grown
 from safety.faults import FAULTS
 from tools.places.whole_file import write_whole
-from tools.report import words
+from tools.report import run_summary
+from tools.report.growing_log import GrowingLog
 from tools.report.run_data import RunData, read_run
 from tools.report.style import PHASE_COLOURS, phase_spans
-from tools.report.written_log import WrittenLog
 
 TEMPLATE = Path(__file__).with_name("page.html")
 MOST_SUMMARY_BYTES = 4 << 20
@@ -33,19 +33,19 @@ MOST_ROWS = 200
 CAPTIONS = {
     "trajectory": "From above, in the frame of the path. Arrows: force on the object. Circles: contact ball, if known.",
     "force": "Force on the object, and on a logarithmic scale the raw reading (bias removed) against the limits.",
-    "speed": "Speed of the base: what the law wanted, what safety let through, what odometry measured.",
+    "speed": "Speed of the base: requested by the law, allowed by safety, measured by odometry.",
     "tracking": "Lateral offset of the contact point, angles of force and push, heading error of the base.",
-    "timing": "How late the ticks of the loop woke, and when ticks were skipped.",
+    "timing": "How late the ticks of the loop started, and when ticks were skipped.",
     "safety": "Mode of the supervisor and faults over time.",
 }
 
 
 def write_report(log: Path, out_html: Path, *, grown: Grown | None = None) -> dict[str, bytes]:
-    """Write the page of a log; `summary.json` beside the log is used when it is there. Returns the PNGs.
+    """Write the page of a log, using `summary.json` beside the log if it exists. Returns the PNGs.
 
     `grown`: see `walk`, for a log that is still being written.
 
-    Raises UsageError (no such log, or `out_html` is the report of another run), LogDamaged (a log not to be
+    Raises UsageError (no such log, or `out_html` is the report of another run), LogDamaged (the log cannot be
     trusted), EnvironmentFault (the page cannot be written).
     """
     from tools.report.figures import figures
@@ -64,13 +64,13 @@ def write_report(log: Path, out_html: Path, *, grown: Grown | None = None) -> di
 
 
 def run_mark(run: RunData) -> str:
-    """Return what tells this run's report from another's: a checksum over its settings and its first facts."""
+    """Return an identifier of the run: a checksum over its settings and the facts known at its start."""
     facts = sorted(run.run_facts.items())
     return f"{zlib.crc32(json.dumps([run.config_text, facts]).encode()):08x}"
 
 
 def may_write(out_html: Path, mark: str) -> bool:
-    """Return whether nothing is there, or a report of the same run."""
+    """Return whether the file does not exist yet or is a report of the same run."""
     try:
         with out_html.open(encoding="utf-8", errors="replace") as file:
             head = file.read(4096)
@@ -82,7 +82,7 @@ def may_write(out_html: Path, mark: str) -> bool:
 
 
 def read_summary_file(path: Path) -> dict[str, Any]:
-    """Return a run's summary, {} when there is none that can be used."""
+    """Return a run's summary, {} if there is no usable one."""
     try:
         if path.stat().st_size > MOST_SUMMARY_BYTES:
             return {}
@@ -94,13 +94,13 @@ def read_summary_file(path: Path) -> dict[str, Any]:
 
 def page(run: RunData, summary: dict[str, Any], pngs: dict[str, bytes], mark: str) -> str:
     """Return the page. Everything that comes from the log or the summary is escaped."""
-    verdict = words.verdict(run)
+    verdict = run_summary.verdict(run)
     rig = run.rig
     law = "force feedback" if rig.control.controller == "force" else "open loop"
-    level = run.facts.get("level", "level not named")
+    level = run.facts.get("level", "unknown level")
     name = rig.name if rig.name == level else f"{rig.name} ({level})"
     subtitle = f"{name}, {law}, seed {run.facts.get('seed', '-')}, {run.log.name}"
-    baseline = words.baseline_of(rig)
+    baseline = run_summary.baseline_of(rig)
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         run_mark=mark,
         title=_esc(f"{verdict.line} - {rig.name}"),
@@ -109,16 +109,16 @@ def page(run: RunData, summary: dict[str, Any], pngs: dict[str, bytes], mark: st
         verdict_why=_esc(verdict.why),
         subtitle=_esc(subtitle),
         notes="\n".join(f"<p>{_esc(note)}</p>" for note in _notes(run, summary)),
-        tiles="\n".join(f"<div><dt>{_esc(a)}</dt><dd>{_esc(b)}</dd></div>" for a, b in words.tiles(run)),
+        tiles="\n".join(f"<div><dt>{_esc(a)}</dt><dd>{_esc(b)}</dd></div>" for a, b in run_summary.tiles(run)),
         figures=_figures(run, pngs),
         safety=_safety(run),
         devices="\n".join(
-            f"<div><h3>{_esc(device)}</h3>{_table(('', ''), rows, numbers=1) or '<p>Nothing.</p>'}</div>"
-            for device, rows in words.counters(run, summary).items()
+            f"<div><h3>{_esc(device)}</h3>{_table(('', ''), rows, numbers=1) or '<p>No data.</p>'}</div>"
+            for device, rows in run_summary.counters(run, summary).items()
         ),
-        timing=_table(("", ""), words.timing_rows(run), numbers=1) or "<p>The loop made no tick.</p>",
+        timing=_table(("", ""), run_summary.timing_rows(run), numbers=1) or "<p>The log contains no ticks.</p>",
         baseline=_esc(baseline),
-        settings=_table(("setting", "shipped", "this run"), words.differences(rig, baseline)) or "<p>None.</p>",
+        settings=_table(("setting", "shipped", "this run"), run_summary.differences(rig, baseline)) or "<p>None.</p>",
         facts=_table(("", ""), sorted(run.facts.items())),
         replay=_replay(run, summary),
     )
@@ -127,13 +127,13 @@ def page(run: RunData, summary: dict[str, Any], pngs: dict[str, bytes], mark: st
 def _notes(run: RunData, summary: dict[str, Any]) -> list[str]:
     notes = []
     if run.recovered:
-        notes.append(f"This log was recovered ({run.recovered}): what came after its last whole part is missing.")
+        notes.append(f"This log was recovered ({run.recovered}): everything after its last intact part is missing.")
     if run.tick_stride > 1:
         notes.append(f"This log is long: figures show one tick in {run.tick_stride}.")
     if not run.slider_source:
-        notes.append("Where the object was is not known: no motion capture of it was logged.")
-    told = summary.get("notes")
-    return notes + [str(note) for note in told[:20]] if isinstance(told, list) else notes
+        notes.append("The pose of the object is unknown: the log contains no motion capture of it.")
+    more = summary.get("notes")
+    return notes + [str(note) for note in more[:20]] if isinstance(more, list) else notes
 
 
 def _figures(run: RunData, pngs: dict[str, bytes]) -> str:
@@ -166,13 +166,15 @@ def _safety(run: RunData) -> str:
 
 
 def _replay(run: RunData, summary: dict[str, Any]) -> str:
-    told = summary.get("replay")
-    line = f"<p>{_esc(told)}</p>" if isinstance(told, str) else ""
-    return f"{line}<p><code>push replay {_esc(run.log.name)}</code> folds the log again and compares every bit.</p>"
+    result = summary.get("replay")
+    line = f"<p>{_esc(result)}</p>" if isinstance(result, str) else ""
+    return (
+        f"{line}<p><code>push replay {_esc(run.log.name)}</code> re-runs the log's ticks and compares every byte.</p>"
+    )
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 0) -> str:
-    """Return a table, "" without rows; the last `numbers` columns are set to the right."""
+    """Return an HTML table, "" without rows; the last `numbers` columns are right-aligned."""
     if not rows:
         return ""
     classes = [' class="n"' if i >= len(heads) - numbers else "" for i in range(len(heads))]
@@ -187,15 +189,15 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 0
 
 
 def _esc(text: str) -> str:
-    """Escape text of unknown origin; what no one can read, and what is endless, is cut."""
+    """Escape text of unknown origin: unprintable characters become blanks, and long text is cut."""
     shown = "".join(letter if letter.isprintable() else " " for letter in text[:2000])
     return html.escape(re.sub(" {2,}", " ", shown), quote=True)
 
 
 def main(argv: Sequence[str]) -> int:
-    """LOG HTML PARENT: read the log until a byte on stdin says it is finished, write the report; die with PARENT.
+    """Read the log until a byte on stdin says it is finished, then write the report; die with the parent process.
 
-    One line on stderr says what went wrong.
+    argv: LOG HTML PARENT (process id). Returns the exit code; an error is one line on stderr.
     """
     from robot_io.ipc.process import die_with_parent
     from tools.report.style import warm_up
@@ -205,7 +207,7 @@ def main(argv: Sequence[str]) -> int:
     warm_up()
     log = Path(argv[0])
     try:
-        write_report(log, Path(argv[1]), grown=WrittenLog(log, sys.stdin.fileno()).grown)
+        write_report(log, Path(argv[1]), grown=GrowingLog(log, sys.stdin.fileno()).wait_for_size)
     except PushError as error:
         print(error, file=sys.stderr)
         return error.exit_code

@@ -1,4 +1,4 @@
-"""The plan view: where the contact point and the object went, seen from above, in the frame of the path."""
+"""Draw the plan view: the paths of the contact point and the object from above, in the frame of the path."""
 
 from __future__ import annotations
 
@@ -23,19 +23,21 @@ OUTLINE_EVERY_M = 0.5
 MOST_OUTLINES = 40
 LEFT_IN, RIGHT_IN, BOTTOM_IN, LEGEND_IN, GAP_IN = 0.75, 0.15, 0.55, 0.45, 0.32
 LOWEST_IN, HIGHEST_IN = 1.2, 7.0
-"""Of a panel; scales are always equal."""
+"""Limits for a panel's height; both axes always have the same scale."""
 FORCE_ARROW_M = 0.25
-"""Length of the arrow of the median force."""
+"""Length of the arrow for the median force."""
 
 
-class Place:
+class RunInPlan:
     """A run in the plan's frame: x along the path from the first contact (or the path's origin), y to the left, m."""
 
     def __init__(self, run: RunData) -> None:
         self.run = run
         control = run.last.after.control if run.last else None
-        self.met = bool(control and control.contact_seen)
-        self.zero_m = control.contact_from_m if control and self.met and math.isfinite(control.contact_from_m) else 0.0
+        self.contact_seen = bool(control and control.contact_seen)
+        self.zero_m = (
+            control.contact_from_m if control and self.contact_seen and math.isfinite(control.contact_from_m) else 0.0
+        )
         heading = math.radians(run.rig.path.direction_deg)
         self._cos, self._sin, self._heading = math.cos(heading), math.sin(heading), heading
         self.x = run.ticks["along_m"] - self.zero_m
@@ -43,36 +45,36 @@ class Place:
         self.phase = run.ticks["phase"]
 
     def slider(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return the object's time (s), place (m) and heading (rad) in the plan's frame."""
+        """Return the object's time (s), position (m) and heading (rad) in the plan's frame."""
         table, origin = self.run.slider, self.run.rig.path.origin_m
         x, y = table["x_m"] - origin[0], table["y_m"] - origin[1]
         along, left = x * self._cos + y * self._sin - self.zero_m, y * self._cos - x * self._sin
         return table["t_s"], along, left, table["yaw_rad"] - self._heading
 
     def marks(self) -> list[int]:
-        """Return ticks of the push, about every half metre of the contact point's way, first and last among them."""
+        """Return ticks of the push, first and last included, about every half metre the contact point travelled."""
         pushed = np.flatnonzero(np.isin(self.phase, (Phase.PUSH, Phase.LOST, Phase.LOST_HOLD, Phase.REST)))
         pushed = pushed[np.isfinite(self.x[pushed]) & np.isfinite(self.y[pushed])]
         if not len(pushed):
             return []
         way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(self.x[pushed]), np.diff(self.y[pushed])))))
         every = max(OUTLINE_EVERY_M, float(way[-1]) / MOST_OUTLINES)
-        # The last one stands for the end; one too close before it would only be drawn over.
+        # The last mark shows the end; one just before it would only be covered.
         wanted = [*np.arange(0.0, max(way[-1] - every / 2, every / 2), every).tolist(), float(way[-1])]
         return [int(pushed[min(int(np.searchsorted(way, w)), len(pushed) - 1)]) for w in wanted]
 
 
 def trajectory(run: RunData) -> Figure:
     """Draw one run from above."""
-    return _figure([Place(run)], titled=False)
+    return _figure([RunInPlan(run)], titled=False)
 
 
 def compare(runs: Sequence[RunData]) -> Figure:
-    """Draw several runs from above, one below the other at the same scale."""
-    return _figure([Place(run) for run in runs], titled=True)
+    """Draw several runs from above, one below another at the same scale."""
+    return _figure([RunInPlan(run) for run in runs], titled=True)
 
 
-def _figure(places: Sequence[Place], *, titled: bool) -> Figure:
+def _figure(places: Sequence[RunInPlan], *, titled: bool) -> Figure:
     x_range, y_range = _limits(places)
     scale = (WIDTH_IN - LEFT_IN - RIGHT_IN) / (x_range[1] - x_range[0])
     panel_in = scale * (y_range[1] - y_range[0])
@@ -91,19 +93,21 @@ def _figure(places: Sequence[Place], *, titled: bool) -> Figure:
             no_data(axes, "no pose of the base in this log")
             continue
         _draw(axes, place)
-        axes.set_ylabel("left of it (m)")
+        axes.set_ylabel("left of path (m)")
         axes.tick_params(labelbottom=place is places[-1])
         if titled:
             axes.set_title(_title(place.run), loc="left", fontweight="bold")
-    met = all(place.met for place in places)
-    panels[-1].set_xlabel("along the path, from first contact (m)" if met else "along the path, from its origin (m)")
+    all_seen = all(place.contact_seen for place in places)
+    panels[-1].set_xlabel(
+        "along the path, from first contact (m)" if all_seen else "along the path, from its origin (m)"
+    )
     handles, labels = _legend(panels)
     if handles:
         figure.legend(handles, labels, loc="upper center", ncols=4, frameon=False, handlelength=1.6)
     return figure
 
 
-def _draw(axes: Axes, place: Place) -> None:
+def _draw(axes: Axes, place: RunInPlan) -> None:
     x, y, marks = place.x, place.y, place.marks()
     way = [-place.zero_m, place.run.rig.control.distance_m]
     axes.plot(way, [0.0, 0.0], color=INK, linestyle=(0, (5, 4)), linewidth=1.0, label="path")
@@ -122,12 +126,12 @@ def _draw(axes: Axes, place: Place) -> None:
 
 
 def ended(run: RunData) -> int | None:
-    """Return the exit code that the log says, None when it ends before the run does."""
+    """Return the exit code recorded in the log, None if the log ends before the run does."""
     return run.last.output.exit_code if run.last and run.last.output.finished else None
 
 
 def outline(run: RunData) -> list[tuple[float, float]] | None:
-    """Return the object's outline in its own frame (m), closed; None where its shape is not known."""
+    """Return the object's closed outline in its own frame (m); None if its shape is unknown."""
     if run.rig.base.level == "hardware":
         return None
     slider = run.rig.world.slider
@@ -147,8 +151,8 @@ def _title(run: RunData) -> str:
     return f"{law}: {how} {control.end_progress_m or control.progress_m:.2f} m"
 
 
-def _limits(places: Sequence[Place]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the ranges along and across the path (m) that hold everything, in a panel of bearable height."""
+def _limits(places: Sequence[RunInPlan]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the ranges along and across the path (m) that contain everything and keep the panel's height in limits."""
     xs = np.concatenate([values for place in places for values in (place.x, place.slider()[1])])
     ys = np.concatenate([values for place in places for values in (place.y, place.slider()[2])])
     reach = max(math.hypot(*corner) for place in places for corner in (outline(place.run) or [(0.2, 0.2)]))
@@ -168,12 +172,12 @@ def _range(values: Floats) -> tuple[float, float]:
     return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
 
 
-def _object(axes: Axes, place: Place) -> None:
+def _object(axes: Axes, place: RunInPlan) -> None:
     times, x, y, yaw = place.slider()
     if not len(times):
         return
     first, last = 0, len(times)
-    if len(place.run.ticks["t_s"]):  # what it did before and after the run is no part of its way
+    if len(place.run.ticks["t_s"]):  # motion before and after the run is not drawn
         first, last = np.searchsorted(times, (0.0, place.run.ticks["t_s"][-1])).tolist()
     axes.plot(x[first:last], y[first:last], color=GREY, linewidth=1.2, linestyle=":", label="object's centre", zorder=2)
     shape = outline(place.run)
@@ -183,7 +187,7 @@ def _object(axes: Axes, place: Place) -> None:
         if not (math.isfinite(x[at]) and math.isfinite(y[at]) and math.isfinite(yaw[at])):
             continue
         c, s = math.cos(yaw[at]), math.sin(yaw[at])
-        if shape is None:  # the shape is unknown: only where it points
+        if shape is None:  # the shape is unknown: draw only the heading
             axes.plot([x[at], x[at] + 0.15 * c], [y[at], y[at] + 0.15 * s], color=GREY, linewidth=1.2, zorder=2)
             continue
         axes.fill(
@@ -198,8 +202,8 @@ def _object(axes: Axes, place: Place) -> None:
         label = "_"
 
 
-def _balls(axes: Axes, place: Place) -> None:
-    """Draw the contact ball at each mark; a real rig's ball size is not known, so there it is left out."""
+def _balls(axes: Axes, place: RunInPlan) -> None:
+    """Draw the contact ball at each mark, but not for a real rig, whose ball size is unknown."""
     if place.run.rig.base.level == "hardware":
         return
     from matplotlib.patches import Circle
@@ -209,7 +213,7 @@ def _balls(axes: Axes, place: Place) -> None:
         axes.add_patch(Circle(at, place.run.rig.world.ball_radius_m, facecolor="none", edgecolor=BLUE, linewidth=0.9))
 
 
-def _forces(axes: Axes, place: Place) -> None:
+def _forces(axes: Axes, place: RunInPlan) -> None:
     ticks, marks = place.run.ticks, place.marks()
     fx, fy = ticks["force_x"], ticks["force_y"]
     size = np.hypot(fx, fy)
@@ -230,7 +234,7 @@ def _forces(axes: Axes, place: Place) -> None:
         headwidth=5,
         zorder=4,
     )
-    # A quiver has no entry of its own in a legend.
+    # A quiver has no legend entry of its own.
     axes.plot([], [], color=VERMILLION, linewidth=2, label="force on the object")
 
 

@@ -1,7 +1,7 @@
-"""The report of a run, made in a process of its own: a report that cannot be made is no failure of the run.
+"""Make the report of a run in a separate process, so that a failing report does not fail the run.
 
-Level `sim` starts it with the run, so that its imports and the reading of the log (most of its time) pass beside the
-run; a wall-clock run starts it only after its end, because nothing may disturb the loop.
+At level `sim` it starts with the run, so that its imports and the reading of the log (most of its time) happen during
+the run; a wall-clock run starts it only at its end, because nothing may disturb the loop.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ TIMEOUT_S = 60.0
 
 
 class ReportProcess:
-    """`python -m tools.report.page LOG HTML PARENT`, which reads the log as it grows; a byte on stdin: it is whole."""
+    """Runs `python -m tools.report.page LOG HTML PARENT`, which follows the log until a byte on stdin ends it."""
 
     def __init__(self, log: Path, page: Path) -> None:
-        """Start it. Raises EnvironmentFault when no process can be started."""
+        """Start the process. Raises EnvironmentFault if it cannot be started."""
         self.page = page
         command, environment = fresh_interpreter("tools.report.page")
         try:
@@ -33,12 +33,12 @@ class ReportProcess:
                 start_new_session=True,
             )
         except OSError as error:
-            raise EnvironmentFault(f"no process for the report: {error.strerror}") from None
+            raise EnvironmentFault(f"the report's process cannot be started: {error.strerror}") from None
 
     def make(self) -> str:
-        """Tell it that the log is finished, and let it write the page; return why it could not, "" when it did."""
+        """Tell the process that the log is finished and wait for the page; return why it failed, "" if it succeeded."""
         try:
-            _, said = self._process.communicate(b"G", timeout=TIMEOUT_S)
+            _, errors = self._process.communicate(b"G", timeout=TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self.drop()
             return f"it took longer than {TIMEOUT_S:g} s"
@@ -47,11 +47,11 @@ class ReportProcess:
             return "stopped by the operator"
         if self._process.returncode == 0:
             return ""
-        lines = said.decode(errors="replace").strip().splitlines()
+        lines = errors.decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else f"its process ended with code {self._process.returncode}"
 
     def drop(self) -> None:
-        """End it without a report; idempotent."""
+        """End the process without a report; idempotent."""
         if self._process.poll() is None:
             self._process.kill()
         self._process.communicate()

@@ -1,4 +1,4 @@
-"""One finished log, read once into plain numbers for figures and tables; its memory is bounded, however long it is."""
+"""Read a log once into plain numbers for figures and tables, in bounded memory however long the log is."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ TICK_COLUMNS = (
     "heading_error",
     "phase",
 )
-"""Per tick; forces in N in the PATH frame, angles in rad in the PATH frame, speeds in m/s, heading error in rad.
+"""One row per tick; forces in N and angles in rad in the PATH frame, speeds in m/s, heading error in rad.
 
-`along_m` is from the path's origin. `force_raw` is the size of the newest reading less the bias, as safety judges it.
+`along_m` is from the path's origin. `force_raw` is the magnitude of the newest reading minus bias, as safety uses it.
 """
 SLIDER_COLUMNS = ("t_s", "x_m", "y_m", "yaw_rad")
 READ: dict[str, CdrType[Any]] = {
@@ -54,29 +54,29 @@ READ: dict[str, CdrType[Any]] = {
     "/world/state": STATE_CDR,
     "/slider/pose": POSE_STAMPED,
 }
-"""The topics that are read, and what their messages are; all others are passed over."""
+"""The topics that are read, and the types of their messages; all others are skipped."""
 
 
 @dataclass
 class RunData:
-    """What the report needs of a log. Times in s since the first tick (or first message, when there is no tick)."""
+    """What the report needs from a log. Times in s since the first tick (or message, if there are no ticks)."""
 
     log: Path
     rig: RigConfig
     facts: dict[str, str]
     recovered: str
-    """What was wrong with the log before `push log recover`; "" for a log as it was written."""
+    """What was wrong with the log before `push log recover`; "" for an original log."""
     ticks: dict[str, Floats]
     tick_stride: int
-    """Every how many ticks one was kept."""
+    """One in this many ticks was kept."""
     slider: dict[str, Floats]
     slider_source: str
-    """ "world" (truth), "motion capture", or "" when the object's pose is not known."""
+    """ "world" (truth), "motion capture", or "" if the object's pose is unknown."""
     late: Tally
     skipped: int
     skips: list[tuple[float, int]]
     ages: dict[str, Tally]
-    """How old each device's newest data was at each kept tick: ft, arm, base."""
+    """Age of each device's newest data at each kept tick: ft, arm, base."""
     faults: list[Span]
     modes: list[Span]
     first: ControlTick | None
@@ -86,11 +86,11 @@ class RunData:
     duration_s: float
     config_text: str = ""
     run_facts: dict[str, str] = field(default_factory=dict)
-    """Of `facts`, those known when the run began: with the config they tell one run from another."""
+    """The `facts` known at the start of the run: together with the config they identify it."""
 
 
 def read_run(path: Path, *, grown: Grown | None = None) -> RunData:
-    """Read a log to its end. Raises UsageError (no such file) and LogDamaged (not to be trusted, or not a run's).
+    """Read a log to its end. Raises UsageError (no such file) and LogDamaged (cannot be trusted, or not a run's log).
 
     `grown`: see `walk`, for a log that is still being written.
     """
@@ -110,7 +110,7 @@ def read_run(path: Path, *, grown: Grown | None = None) -> RunData:
 
 
 class _Reader:
-    """Takes the records of one log in the order of the file."""
+    """Collects the records of one log, given in file order."""
 
     def __init__(self, path: Path) -> None:
         self.metadata: dict[str, dict[str, str]] = {}
@@ -138,7 +138,7 @@ class _Reader:
         self._end_s = 0.0
 
     def config(self, data: bytes) -> None:
-        """Take the rig of the run; its format stands in the metadata, so it is read with the first tick."""
+        """Take the rig of the run; decoded with the first tick, because its format is in the metadata."""
         self._config = data
 
     def channel(self, topic: str, schema_name: str, schema: bytes) -> None:
@@ -146,9 +146,9 @@ class _Reader:
         if topic not in READ:
             return
         text = schema.decode(errors="replace")
-        its_format = self._format()
+        log_format = self._format()
         try:
-            self._types[topic] = LoggedType(READ[topic], schema_name, text, its_format)
+            self._types[topic] = LoggedType(READ[topic], schema_name, text, log_format)
         except LogDamaged as error:
             raise self._foreign(f"its {topic}: {error.what}") from None
 
@@ -172,7 +172,7 @@ class _Reader:
         elif topic == "/world/state" and self._world.wants():
             slider = self._types[topic].decode(payload).slider
             self._world.add((time_s, slider.x, slider.y, slider.yaw))
-        # A simulated run's /slider/pose is made of the world's state, so the world goes first.
+        # A simulated run's /slider/pose is derived from the world's state, so the world takes precedence.
         elif topic == "/slider/pose" and not len(self._world) and self._seen.wants():
             pose = self._types[topic].decode(payload).pose
             turned = pose.orientation
@@ -181,8 +181,8 @@ class _Reader:
             self._seen.add((time_s, at.x, at.y, math.nan if yaw is None else yaw))
 
     def finish(self) -> RunData:
-        """Return what was read."""
-        rig = self._read_rig("it holds no config.toml")
+        """Return the collected data."""
+        rig = self._read_rig("it contains no config.toml")
         last = self._types["/control/tick"].decode(self._last_payload) if self._last_payload else None
         recovered = self.metadata.get("recovered")
         ticks, world, seen = self._ticks.arrays(), self._world.arrays(), self._seen.arrays()
@@ -215,7 +215,7 @@ class _Reader:
 
     def _tick(self, time_s: float, payload: bytes) -> None:
         if self._rig is None:
-            self._read_rig("it holds no config.toml before its first tick")
+            self._read_rig("it contains no config.toml before its first tick")
         self._count += 1
         self._last_payload = payload
         if not self._ticks.wants():
@@ -275,10 +275,10 @@ class _Reader:
     def _read_rig(self, missing: str) -> RigConfig:
         if self._config is None:
             raise self._foreign(missing)
-        its_format = self._format()
+        log_format = self._format()
         try:
             self._text = self._config.decode()
-            self._rig = rig_of_log(self._text, its_format).rig
+            self._rig = rig_of_log(self._text, log_format).rig
         except (UnicodeDecodeError, PushError) as error:
             raise self._foreign(f"its config.toml cannot be used: {error}") from None
         self._path_frame = StraightPath.of(self._rig.path.origin_m, self._rig.path.direction_deg)

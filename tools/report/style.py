@@ -1,4 +1,4 @@
-"""How the report's figures look: one size of text, colours that colour-blind people can tell apart, shaded phases."""
+"""Common style of the report's figures: text size, colours that colour-blind people can distinguish, shaded phases."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _STYLE: Any = {
     "legend.framealpha": 0.9,
     "legend.edgecolor": "#cccccc",
     "savefig.facecolor": "white",
-    # Names come from a log: they are never taken for formulas.
+    # Names come from a log: never interpret them as formulas.
     "text.parse_math": False,
     "axes.unicode_minus": False,
     "agg.path.chunksize": 20_000,
@@ -67,7 +67,7 @@ _STYLE: Any = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Apply the look while figures are drawn and written."""
+    """Apply the style while figures are drawn and written."""
     import matplotlib as mpl
 
     with mpl.rc_context(_STYLE):
@@ -75,7 +75,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(height_in: float, *, constrained: bool = True) -> Figure:
-    """Return an empty figure that needs no display; `constrained`: matplotlib lays it out."""
+    """Return an empty figure that needs no display; `constrained`: matplotlib computes its layout."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -85,9 +85,9 @@ def new_figure(height_in: float, *, constrained: bool = True) -> Figure:
 
 
 def new_panels(height_in: float, *, left_in: float = 0.75, gap_in: float = 0.1) -> Figure:
-    """Return an empty figure with fixed margins for panels one above the other, `gap_in` apart.
+    """Return an empty figure with fixed margins for panels one above another, `gap_in` apart.
 
-    Room for the labels is known here, and asking matplotlib for it costs as much as drawing does.
+    The space for labels is known; letting matplotlib compute it would take as long as drawing.
     """
     figure = new_figure(height_in, constrained=False)
     figure.subplots_adjust(
@@ -100,7 +100,7 @@ def png(figure: Figure, dpi: float = DPI) -> bytes:
     """Return a figure as PNG; the same figure gives the same bytes."""
     engine = figure.get_layout_engine()
     if engine is not None:
-        # Laid out here and once: savefig with an engine draws everything a second time, a third of a report's time.
+        # Lay out once, here: savefig with an engine draws everything twice, a third of a report's time.
         engine.execute(figure)
         figure.set_layout_engine("none")
     target = io.BytesIO()
@@ -117,13 +117,13 @@ def warm_up() -> None:
 
 
 def plain(text: str, most: int = 40) -> str:
-    """Return text of a log as the figure's font can write it."""
+    """Return text from a log reduced to what the figure's font can show, at most `most` characters."""
     kept = "".join(letter if " " <= letter <= "~" else "?" for letter in text)
     return kept if len(kept) <= most else kept[: most - 3] + "..."
 
 
 def phase_spans(ticks: dict[str, Floats]) -> list[tuple[Phase, float, float]]:
-    """Return (phase, from, to) in s, in order; what is no phase is left out."""
+    """Return (phase, from, to) in s, in order; unknown phases are left out."""
     times, phases = ticks["t_s"], ticks["phase"]
     if not len(times):
         return []
@@ -138,7 +138,7 @@ def phase_spans(ticks: dict[str, Floats]) -> list[tuple[Phase, float, float]]:
 
 
 def shade_phases(axes: Axes, ticks: dict[str, Floats], *, named: bool) -> None:
-    """Shade the phases behind a time plot, and write their names above it where there is room."""
+    """Shade the phases behind a time plot, and write their names above it where they fit."""
     spans = phase_spans(ticks)
     if not spans:
         return
@@ -161,6 +161,6 @@ def shade_phases(axes: Axes, ticks: dict[str, Floats], *, named: bool) -> None:
 
 
 def no_data(axes: Axes, text: str) -> None:
-    """Say in an empty plot why it is empty."""
+    """Write into an empty plot why it is empty."""
     axes.set_axis_off()
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=11, color=GREY)

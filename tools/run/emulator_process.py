@@ -21,7 +21,7 @@ from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import rig_from_toml
 from sim_backend.world.world import World
-from tools.log.world_log import into
+from tools.log.world_log import ring_listener
 from tools.run.emulators import Emulator, address_of, open_emulator
 from tools.run.jobs import EmulatorJob
 
@@ -71,7 +71,7 @@ def main() -> int:
     ring = Ring(job.ring_fd)
     opened: dict[str, Emulator] = {}
     try:
-        world = World(rig, job.seed, monotonic_ns(), into(ring.push))
+        world = World(rig, job.seed, monotonic_ns(), ring_listener(ring.push))
         for device in job.devices:
             opened[device] = open_emulator(loop, world, rig, device, job.kind_folder)
     except PushError as error:

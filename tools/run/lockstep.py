@@ -30,7 +30,7 @@ from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
 from tools.kinds import is_shipped, name_of
 from tools.log.run_log import RunLog
-from tools.log.world_log import into
+from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
 from tools.run.run_facts import run_facts
 from tools.run.run_state import first_state
@@ -69,7 +69,7 @@ class Lockstep:
         push = log.record
         self._clock = VirtualClock(START_NS)
         self._period_ns = round(NS_PER_S / rig.loop.rate_hz)
-        self.world = World(rig, seed, START_NS, into(push))
+        self.world = World(rig, seed, START_NS, ring_listener(push))
         world = rig.world
         self._ft = simulated_sensor(rig, self.world, self._clock)
         self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_rate_hz, phase=world.arm_phase)

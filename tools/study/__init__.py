@@ -1,1 +1,1 @@
-"""Many simulated pushes: which lanes, how they are spread over workers, what is kept and drawn."""
+"""Simulation studies: define many pushes, run them on workers, store, summarise and draw the results."""

@@ -1,4 +1,4 @@
-"""Runs a study's items on this machine's cores, or on a Dask cluster, and hands each result over as it comes."""
+"""Run a study's items on this machine's cores or on a Dask cluster, and yield each result as it arrives."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Result = TypeVar("Result")
 
 SCHEDULER_TIMEOUT_S = 5.0
 CLUSTER_TIMEOUT_S = 60.0
-"""How long a scheduler may be without any worker: clusters start them when they are asked for."""
+"""How long a scheduler may have no worker: clusters start workers on demand."""
 
 
 def default_workers() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores this process may use."""
     return len(os.sched_getaffinity(0))
 
 
@@ -28,7 +28,7 @@ def default_workers() -> int:
 def engine(name: str, scheduler: str | None) -> Iterator[None]:
     """Make joblib send its work to the named engine: `joblib` (processes here) or `dask` (a running scheduler).
 
-    Raises UsageError for `dask` without a scheduler, EnvironmentFault when the package or the scheduler is not there.
+    Raises UsageError for `dask` without a scheduler, EnvironmentFault if the package or the scheduler is missing.
     """
     if name == "joblib":
         if scheduler:
@@ -45,7 +45,7 @@ def engine(name: str, scheduler: str | None) -> Iterator[None]:
         ) from None
     import joblib
 
-    connect: Any = distributed.Client  # distributed has no types here
+    connect: Any = distributed.Client  # distributed is untyped
     try:
         client = connect(scheduler, timeout=SCHEDULER_TIMEOUT_S, set_as_default=True)
     except (OSError, ValueError) as error:
@@ -71,7 +71,7 @@ def run_items(
 ) -> Iterator[tuple[int, Result]]:
     """Yield (number, function(item)) as the items finish, in any order. `local`: on this machine's cores.
 
-    One worker needs no other process. Leaving early (an error, Ctrl-C) ends the worker processes.
+    One worker runs in this process. Leaving early (an error, Ctrl-C) ends the worker processes.
     """
     if local and (workers == 1 or len(items) <= 1):
         for number, item in items:
@@ -82,10 +82,10 @@ def run_items(
 
     pool: Any = joblib.Parallel(
         n_jobs=workers if local else -1, batch_size=1, return_as="generator_unordered", pre_dispatch="2*n_jobs",
-        **({"initializer": _leave_ctrl_c_to_parent} if local else {}),
+        **({"initializer": _ignore_sigint} if local else {}),
     )  # fmt: skip
     with warnings.catch_warnings():
-        # leaving early is meant: joblib warns that it cancels what is under way
+        # leaving early is intended: joblib warns that it cancels pending work
         warnings.simplefilter("ignore", UserWarning)
         results = pool(joblib.delayed(_numbered)(function, number, item) for number, item in items)
         try:
@@ -103,8 +103,8 @@ def run_items(
             results.close()
 
 
-def _leave_ctrl_c_to_parent() -> None:
-    """Ignore SIGINT in a worker: a terminal sends it there too, and one that waits for work would print a traceback."""
+def _ignore_sigint() -> None:
+    """Ignore SIGINT in a worker: a terminal sends it to workers too, and an idle one would print a traceback."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

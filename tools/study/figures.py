@@ -1,4 +1,4 @@
-"""The figures of a study, as PNG and SVG: all trajectories, and the paper's four samples with the slider drawn in."""
+"""Draw the figures of a study as PNG and SVG: all trajectories, and the paper's four samples with outlines."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SAMPLE_SECONDS = 120.0
-"""Of a sample's ten minutes, what is drawn."""
+"""Part of a sample's ten minutes that is drawn."""
 OUTLINE_EVERY_S = 15.0
 MOST_LINES = 1000
-"""Of more trajectories in a panel, some evenly spaced ones are drawn."""
+"""A panel with more trajectories shows an evenly spaced subset."""
 
 
 def save(figure: Figure, out: Path, name: str) -> list[str]:
@@ -36,9 +36,9 @@ def save(figure: Figure, out: Path, name: str) -> list[str]:
 
 
 def trajectories(cases: Sequence[Case], states: Floats, ends: Floats, title: str) -> Figure:
-    """Draw the path of every slider's centre, one panel a shape.
+    """Draw the path of every slider's centre, one panel per shape.
 
-    `states`: (cases, records, 6), NaN after an end; `ends`: (cases, 2), the last x, y (it lies between two records).
+    `states`: (cases, records, 6), NaN after an end; `ends`: (cases, 2), the final x, y (possibly between two records).
     """
     import numpy as np
 
@@ -52,8 +52,8 @@ def trajectories(cases: Sequence[Case], states: Floats, ends: Floats, title: str
             kept = states[i, ~np.isnan(states[i, :, 0]), :2]
             axes.plot(*np.vstack([kept, ends[i]]).T, linewidth=0.5, alpha=0.4)
         axes.axhline(0.0, color="black", linewidth=0.8, linestyle="--")
-        some = "" if len(drawn) == len(chosen) else f", {len(drawn)} of them drawn"
-        axes.set_title(f"{shape}: {len(chosen)} pushes{some}", fontsize=9)
+        subset = "" if len(drawn) == len(chosen) else f", {len(drawn)} of them shown"
+        axes.set_title(f"{shape}: {len(chosen)} pushes{subset}", fontsize=9)
         axes.set_ylabel("y (m)")
     panels[-1].set_xlabel("x (m)")
     figure.suptitle(title, fontsize=10)
@@ -61,7 +61,7 @@ def trajectories(cases: Sequence[Case], states: Floats, ends: Floats, title: str
 
 
 def experiment(rows: Sequence[Row], states: Floats) -> Figure:
-    """Draw the simulated experiment, one panel a slider: the law's pushes in colour, open loop in black.
+    """Draw the simulated experiment, one panel per slider: force feedback in colour, open loop in black.
 
     `states`: (runs, kept, 3), the slider's pose.
     """
@@ -76,7 +76,7 @@ def experiment(rows: Sequence[Row], states: Floats) -> Figure:
         for y in (-0.5, 0.5):
             axes.axhline(y, color="grey", linewidth=0.8, linestyle=":")
         axes.axhline(0.0, color="grey", linewidth=0.8, linestyle="--")
-        axes.set_title(f"{slider}: by the law in colour, open loop in black", fontsize=9)
+        axes.set_title(f"{slider}: force feedback in colour, open loop in black", fontsize=9)
         axes.set_ylabel("y (m)")
     panels[-1].set_xlabel("x (m)")
     return figure

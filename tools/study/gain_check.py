@@ -1,7 +1,7 @@
-"""The limits of `sim_backend.physics.gain_limits` found again by simulation: where a small weave begins to grow.
+"""Verify the limits of `sim_backend.physics.gain_limits` by simulation: where a small oscillation begins to grow.
 
-The simulated push is the world's own (`contact.PushedSlider` with its floor), the law steps with the force of the step
-before, and the growth rate of a small weave is followed through zero.
+The push is simulated by the world's own model (`contact.PushedSlider` with its floor), the law uses the force of the
+previous step, and a search finds the gain at which the growth rate of a small oscillation is zero.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from sim_backend.physics.slider import SliderModel
 SPEED_M_PER_S = 0.1
 LONGEST_STEP_S = 0.004
 STEP_SHARE = 0.003
-"""The step is at most this share of the time to push the slider by half its length: that is what its delay costs."""
+"""Maximum step, as a share of the time to push the slider by half its length: limits the effect of the delay."""
 EULER_SHARE = 0.5
-"""... and this share of the time in which a contact without friction slides back to a face's middle (not beyond 2)."""
+"""... and as a share of the time in which a frictionless contact slides back to a face's middle (at most 2)."""
 START_OFFSET_M = 1e-4
-"""Small, so that the weave stays linear."""
+"""Small, so that the oscillation stays linear."""
 SWINGS = 6
-"""Extremes of the weave that are compared, after the first ones."""
+"""Number of extremes compared, after the first ones."""
 LONGEST_S = 2000.0
 STICKING_FRICTION = 2.0
 
 
 def simulated_limit(body: PushedBody, k_f: float, *, frictionless: bool, near: float) -> float:
-    """Return the k_y (rad/m) at which the growth rate of a small weave is 0, searched from `near`."""
+    """Return the k_y (rad/m) at which the growth rate of a small oscillation is 0, searched from `near`."""
     low, high = 0.97 * near, 1.03 * near
     rate_low, rate_high = (growth_rate(body, k_f, k_y, frictionless=frictionless) for k_y in (low, high))
-    for _ in range(2):  # secant: the rate is almost straight in k_y
+    for _ in range(2):  # secant method: the rate is almost linear in k_y
         middle = low - rate_low * (high - low) / (rate_high - rate_low)
         low, rate_low = (high, rate_high) if abs(high - middle) < abs(low - middle) else (low, rate_low)
         high, rate_high = middle, growth_rate(body, k_f, middle, frictionless=frictionless)
@@ -40,7 +40,7 @@ def simulated_limit(body: PushedBody, k_f: float, *, frictionless: bool, near: f
 
 
 def growth_rate(body: PushedBody, k_f: float, k_y_rad_per_m: float, *, frictionless: bool) -> float:
-    """Return the rate (1/s) at which a small weave grows, from the extremes of the ball's lateral place."""
+    """Return the growth rate (1/s) of a small oscillation, from the extremes of the ball's lateral position."""
     slider = _slider(body, 0.0 if frictionless else STICKING_FRICTION)
     step_s = _step_s(body, slides=frictionless)
     x, y = -body.rho_m - body.ball_radius_m, START_OFFSET_M
@@ -57,7 +57,7 @@ def growth_rate(body: PushedBody, k_f: float, k_y_rad_per_m: float, *, frictionl
             extremes.append((t, abs(y)))
         old_dy = dy
     if len(extremes) < 4:
-        return log(max(abs(y), 1e-300) / START_OFFSET_M) / t  # no weave: it only runs off or comes back
+        return log(max(abs(y), 1e-300) / START_OFFSET_M) / t  # no oscillation: it only diverges or decays
     (t_first, first), (t_last, last) = extremes[2], extremes[-1]
     return log(last / first) / (t_last - t_first)
 

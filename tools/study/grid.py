@@ -1,7 +1,7 @@
-"""What a simulation study runs: one case's parameters, and the grid or Monte Carlo file that makes many of them.
+"""Define simulation studies: the parameters of one case, and grid or Monte Carlo files that give many cases.
 
 A grid file is TOML: `[fixed]` sets parameters for all cases, `[grid]` lists values of which every combination is
-run (the last key varies fastest), `[random]` draws `samples` cases, its `[random.ranges]` uniform between two numbers.
+run (the last key varies fastest), `[random]` draws `samples` cases uniformly from the two-number `[random.ranges]`.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from sim_backend.physics.slider import Circle, Rectangle, pressure_distance_m
 
 MOST_CASES = 1_000_000
 MOST_STATES = 20_000_000
-"""Kept states of a study: about a gigabyte."""
+"""Recorded states of a study: about a gigabyte."""
 
 
 Length = Annotated[float, Meta(gt=0, le=1000)]
-Place = Annotated[float, Meta(ge=-1000, le=1000)]
+Position = Annotated[float, Meta(ge=-1000, le=1000)]
 
 
 class Case(Table, frozen=True):
@@ -42,12 +42,12 @@ class Case(Table, frozen=True):
     radius_m: Length = 0.5
     pressure: Literal["uniform", "rim", "point"] = "uniform"
     tau_max_Nm: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
-    """Greatest friction torque of the floor; 0: from `pressure`."""
+    """Maximum friction torque of the floor; 0: computed from `pressure`."""
     f_max_N: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
     contact_friction: Annotated[float, Meta(ge=0, le=10)] = 0.5
-    y0_m: Place = 0.0
+    y0_m: Position = 0.0
     phi0_rad: Annotated[float, Meta(ge=-math.pi, le=math.pi)] = 0.0
-    s0_m: Place = 0.0
+    s0_m: Position = 0.0
     k_f: Annotated[float, Meta(ge=0, le=10)] = 0.1
     k_y_rad_per_m: Annotated[float, Meta(ge=0, le=10)] = 0.01
     speed_m_per_s: Annotated[float, Meta(gt=0, le=100)] = 0.1
@@ -55,7 +55,7 @@ class Case(Table, frozen=True):
 
 
 class TimeTable(Table, frozen=True):
-    """How long each push lasts, its step, and how often its state is kept."""
+    """Duration of each push, its time step, and the interval between recorded states."""
 
     dt_s: Positive = 0.01
     duration_s: Positive = 600.0
@@ -63,7 +63,7 @@ class TimeTable(Table, frozen=True):
 
 
 class RandomTable(Table, frozen=True):
-    """Monte Carlo: so many cases, each of `ranges` drawn uniformly between its two numbers."""
+    """Monte Carlo: this many cases, each parameter in `ranges` drawn uniformly between its two numbers."""
 
     samples: Annotated[int, Meta(ge=1, le=MOST_CASES)]
     ranges: dict[str, tuple[float, float]]
@@ -71,7 +71,7 @@ class RandomTable(Table, frozen=True):
 
 
 class GridFile(Table, frozen=True):
-    """A study as a file."""
+    """The contents of a grid file."""
 
     name: Annotated[str, Meta(pattern="^[A-Za-z0-9._-]+$")] = "grid"
     fixed: Case = Case()
@@ -81,7 +81,7 @@ class GridFile(Table, frozen=True):
 
 
 class Study(msgspec.Struct, frozen=True):
-    """A named list of cases and their common time."""
+    """A named list of cases and their common timing."""
 
     name: str
     cases: tuple[Case, ...]
@@ -89,9 +89,9 @@ class Study(msgspec.Struct, frozen=True):
 
 
 def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None) -> Study:
-    """Read a grid file, with `changes` laid over its `[fixed]` table and its step replaced by `dt_s`.
+    """Read a grid file; `changes` override its `[fixed]` table, and `dt_s` replaces its step.
 
-    Raises ConfigError naming the line of the first mistake, or an empty grid.
+    Raises ConfigError for an empty grid, or naming the line of the first mistake.
     """
     name = str(path)
     try:
@@ -120,7 +120,7 @@ def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None)
         msgspec.convert({**fixed, **combination, **draw}, Case) for combination in combinations for draw in draws
     )
     for case in cases:
-        lane_of(case)  # an impossible slider is found before anything runs
+        lane_of(case)  # report an impossible slider before anything runs
     timing = timing_of(file.time, dt_s, name)
     if len(cases) * timing.records > MOST_STATES:
         raise ConfigError(
@@ -157,33 +157,36 @@ def _random_table(file: GridFile, origins: Origins, name: str) -> RandomTable | 
 def _draws(table: RandomTable | None) -> list[dict[str, Any]]:
     if table is None:
         return [{}]
-    dice = random.Random(table.seed)
-    return [{key: dice.uniform(*ends) for key, ends in table.ranges.items()} for _ in range(table.samples)]
+    rng = random.Random(table.seed)
+    return [{key: rng.uniform(*ends) for key, ends in table.ranges.items()} for _ in range(table.samples)]
 
 
 def _check_parameter(key: str, value: Any, where: str) -> None:
-    """Raise ConfigError unless `key = value` could stand in `[fixed]`."""
+    """Raise ConfigError unless `key = value` is valid in `[fixed]`."""
     build(Case, {key: value}, {(key,): where}, where)
 
 
 def timing_of(table: TimeTable, dt_s: float | None = None, where: str = "--dt") -> Timing:
-    """Return steps for a time table; ConfigError unless the step divides the duration and the recording interval."""
+    """Return the steps of a time table.
+
+    Raises ConfigError unless the step divides the duration and the recording interval."""
     dt = table.dt_s if dt_s is None else dt_s
     if not (math.isfinite(dt) and dt > 0):
         raise ConfigError(f"a step of {dt} s is not a positive, finite time", where=where)
     counts = [table.duration_s / dt, table.record_s / dt]
     if any(abs(count - round(count)) > 1e-6 or round(count) < 1 for count in counts):
         raise ConfigError(
-            f"a step of {dt} s does not divide {table.duration_s:g} s and the {table.record_s:g} s between kept states",
+            f"a step of {dt} s does not divide both the duration {table.duration_s:g} s and the recording interval "
+            f"{table.record_s:g} s",
             where=where,
         )
     if counts[0] > 1e8:
-        raise ConfigError(f"{counts[0]:.3g} steps a case are too many", where=where, do="Take a longer step")
+        raise ConfigError(f"{counts[0]:.3g} steps per case are too many", where=where, do="Choose a longer step")
     return Timing(dt, round(counts[0]), round(counts[1]))
 
 
 def lane_of(case: Case) -> Lane:
-    """Return the lane a case means. Raises ConfigError for an impossible slider."""
+    """Return the simulation lane of a case. Raises ConfigError for an impossible slider."""
     shape = Circle(case.radius_m) if case.shape == "circle" else Rectangle(case.length_m, _width(case))
     d = case.tau_max_Nm / case.f_max_N if case.tau_max_Nm else pressure_distance_m(shape, case.pressure)
     round_ = case.shape == "circle"

@@ -1,9 +1,9 @@
-"""`push sweep hardware`: the paper's experiment as simulation, each push a whole lockstep run of the program.
+"""`push sweep hardware`: simulate the paper's experiment, each push a complete lockstep run of the program.
 
-Box and barrel of floor-robot size are pushed 6 m, ten times by the law with the paper's hardware gains and five times
-open loop, over a floor of patches, with the sensor's noise and the base's dynamics, through the same control step,
-safety checks and gate as a real run. Figures of the sliders: 0.40 x 0.60 m and 4.5 kg, radius 0.25 m and 5 kg, floor
-friction 0.3, pushed 0.15 m above the floor.
+A box and a barrel are pushed 6 m, ten times by the law with the paper's hardware gains and five times open loop, over a
+patchy floor, with sensor noise and base dynamics, through the same control step, safety checks and gate as a real run.
+The box measures 0.40 x 0.60 m and weighs 4.5 kg, the barrel has a radius of 0.25 m and weighs 5 kg; floor friction is
+0.3, and both are pushed 0.15 m above the floor.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ CORRIDOR_M = 0.5
 """Half the width of the paper's corridor."""
 OPEN_LOOP_FAILS_M = 2.0
 GREATEST_EDGE_OFFSET_M = 0.07
-"""The pusher starts this far from the middle of the slider's side at most, spread evenly over the runs.
+"""Maximum distance of the pusher's start from the middle of the slider's side; starts are spread evenly over the runs.
 
-The paper gives no figure. Chosen for the result: from 0.08 m on, two of the box's ten pushes reach 0.51 m, just
+The paper gives no value. Chosen for the result: from 0.08 m on, two of the box's ten pushes reach 0.51 m, just
 outside the corridor.
 """
 GREATEST_LATERAL_M = 0.05
@@ -45,11 +45,11 @@ COLUMNS = (
     "run", "slider", "controller", "k_f", "k_y", "seed", "lateral_offset_m", "edge_offset_m", "heading_deg",
     "code", "exit_code", "distance_m", "lateral_error_m", "max_abs_y_m", "max_abs_y_c_m", "faults", "error",
 )  # fmt: skip
-"""`code`: done, lost (contact lost), stopped (by safety) or error; `max_abs_y_m` is of the slider's centre."""
+"""`code`: done, lost (contact lost), stopped (by safety) or error; `max_abs_y_m` refers to the slider's centre."""
 
 
 class HardwareItem(msgspec.Struct, frozen=True):
-    """One push: which slider and controller, from where."""
+    """One push: slider, controller, gains and start."""
 
     run: int
     slider: str
@@ -71,12 +71,12 @@ def hardware_items(gains: tuple[float, float] | None) -> list[HardwareItem]:
     k_f, k_y = gains or PAPER_GAINS
     items: list[HardwareItem] = []
     for slider in SLIDERS:
-        dice = random.Random(f"starts-{slider}")
+        rng = random.Random(f"starts-{slider}")
         starts = [
             (
-                dice.uniform(-GREATEST_LATERAL_M, GREATEST_LATERAL_M),
+                rng.uniform(-GREATEST_LATERAL_M, GREATEST_LATERAL_M),
                 GREATEST_EDGE_OFFSET_M * (2 * i / (CLOSED_RUNS - 1) - 1),
-                dice.uniform(-GREATEST_HEADING_DEG, GREATEST_HEADING_DEG),
+                rng.uniform(-GREATEST_HEADING_DEG, GREATEST_HEADING_DEG),
             )
             for i in range(CLOSED_RUNS)
         ]
@@ -103,17 +103,17 @@ def rig_of(item: HardwareItem) -> RigConfig:
 
 
 class _NoLog:
-    """A lockstep run keeps no log in a sweep."""
+    """Discards the log of a lockstep run in a sweep."""
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
-        """Keep nothing."""
+        """Discard a record."""
 
     def tick(self, time_ns: int, payload: bytes, tick: object) -> None:
-        """Keep nothing."""
+        """Discard a record."""
 
 
 def run_hardware_item(item: HardwareItem) -> Part:
-    """Run one push; arrays: `slider`, shape (kept, 3): x, y, yaw of the slider every tenth of a second."""
+    """Run one push; arrays: `slider`, shape (kept, 3): x, y, yaw of the slider every 0.1 s."""
     import numpy as np
 
     from tools.run.lockstep import Lockstep
@@ -135,19 +135,19 @@ def run_hardware_item(item: HardwareItem) -> Part:
         rig = rig_of(item)
         push = Lockstep(rig, item.run, _NoLog())
 
-        def look(inp: Any, state: Any, output: Any) -> None:
+        def record_pose(inp: Any, state: Any, output: Any) -> None:
             if inp.tick % KEEP_EVERY_TICKS == 0:
                 pose = push.world.read_slider(push.world.now_ns)
                 kept.append((pose.x, pose.y, pose.yaw))
                 if state.control.contact_seen:
                     contact[0] = max(contact[0], abs(state.control.lateral_m))
 
-        figures = push.run(look)
+        figures = push.run(record_pose)
     except PushError as error:
         return Part([row | {"code": "error", "error": str(error)}], {"slider": np.array(kept).reshape(-1, 3)})
-    except Exception as error:  # one bad push must not cost the study; its row names the defect
-        told = f"{type(error).__name__}: {error}"
-        return Part([row | {"code": "error", "error": told}], {"slider": np.array(kept).reshape(-1, 3)})
+    except Exception as error:  # one bad push must not abort the study; its row names the defect
+        message = f"{type(error).__name__}: {error}"
+        return Part([row | {"code": "error", "error": message}], {"slider": np.array(kept).reshape(-1, 3)})
     row |= {
         "code": {0: "done", 6: "lost"}.get(figures["exit_code"], "stopped"),
         "exit_code": figures["exit_code"],
@@ -162,7 +162,7 @@ def run_hardware_item(item: HardwareItem) -> Part:
 
 
 def sources(root: Path) -> tuple[Path, ...]:
-    """Return the program text a push depends on."""
+    """Return the source files a push depends on."""
     folders = ("control", "safety", "sim_backend", "robot_io")
     found = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
     found += sorted((root / "robot_io" / "rig").glob("*.toml"))
@@ -171,7 +171,7 @@ def sources(root: Path) -> tuple[Path, ...]:
 
 
 def check_flags(dt_s: float | None, open_loop: bool) -> None:
-    """Raise UsageError for flags of the other studies."""
+    """Raise UsageError for flags that only other studies accept."""
     if dt_s is not None or open_loop:
         raise UsageError(
             "`push sweep hardware` has its own step and both controllers", do="Leave out --dt and --open-loop"

@@ -1,4 +1,4 @@
-"""What the simulated experiment came to, against what the paper says of the real one."""
+"""Summarise the simulated experiment and compare it with the paper's real one."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 def summarise_hardware(rows: Sequence[Row], states: Floats) -> dict[str, Any]:
-    """Return per slider what the paper claims, with numbers, and where this model says otherwise.
+    """Return the figures behind the paper's claims for each slider, and the runs in which this model differs.
 
     `states`: (runs, kept, 3), the slider's pose, NaN after a run's end.
     """
     sliders: dict[str, Any] = {}
-    otherwise: list[str] = []
+    differing: list[str] = []
     for slider in SLIDERS:
         closed = [r for r in rows if r["slider"] == slider and r["controller"] == "force"]
         opened = [r for r in rows if r["slider"] == slider and r["controller"] == "open-loop"]
@@ -44,26 +44,26 @@ def summarise_hardware(rows: Sequence[Row], states: Floats) -> dict[str, Any]:
         }
         for row in closed:
             if row not in inside:
-                otherwise.append(
-                    f"{slider}, run {row['run']}: {row['code']}, greatest |y| {_told(row, 'max_abs_y_m')} m "
+                differing.append(
+                    f"{slider}, run {row['run']}: {row['code']}, maximum |y| {_two_decimals(row, 'max_abs_y_m')} m "
                     f"(start {float(row['edge_offset_m']):+.3f} m off the middle)"
                 )
         for row in opened:
             if row not in lost:
-                otherwise.append(
-                    f"{slider}, open-loop run {row['run']}: {row['code']} after {_told(row, 'distance_m')} m "
+                differing.append(
+                    f"{slider}, open-loop run {row['run']}: {row['code']} after {_two_decimals(row, 'distance_m')} m "
                     f"(start {float(row['edge_offset_m']):+.3f} m off the middle)"
                 )
-    return {"study": "hardware", "runs": len(rows), "sliders": sliders, "otherwise_than_the_paper": otherwise}
+    return {"study": "hardware", "runs": len(rows), "sliders": sliders, "otherwise_than_the_paper": differing}
 
 
 def hardware_sentences(summary: dict[str, Any]) -> list[str]:
-    """Return the summary as lines for people."""
+    """Return the summary as readable lines."""
     lines = []
     for slider, s in summary["sliders"].items():
         lines.append(
             f"{slider}: {s['closed_loop_inside_corridor']} of {s['closed_loop_runs']} pushes reach {DISTANCE_M:g} m "
-            f"inside the 1 m corridor; open loop loses it within {OPEN_LOOP_FAILS_M:g} m in "
+            f"inside the 1 m corridor; open loop loses the object within {OPEN_LOOP_FAILS_M:g} m in "
             f"{s['open_loop_lost_within_2_m']} of {s['open_loop_runs']} "
             f"(after {', '.join(f'{d:.2f}' for d in s['open_loop_lost_after_m'])} m)"
         )
@@ -76,7 +76,7 @@ def hardware_sentences(summary: dict[str, Any]) -> list[str]:
 
 
 def _growth(poses: Floats) -> float:
-    """Return how far |y| reaches in the second half of the way, relative to the first."""
+    """Return the ratio of maximum |y| in the second half of the push to that in the first half."""
     x, y = poses[:, 0], abs(poses[:, 1])
     start = x[0]
     middle = start + DISTANCE_M / 2
@@ -92,5 +92,5 @@ def _greatest(rows: Sequence[Row], key: str) -> float | None:
     return max(values, default=None)
 
 
-def _told(row: Row, key: str) -> str:
+def _two_decimals(row: Row, key: str) -> str:
     return f"{float(row[key]):.2f}" if key in row and math.isfinite(float(row[key])) else "-"

@@ -1,7 +1,7 @@
-"""The unit a study is cut into for workers: a few lanes of one shape, and what came of them.
+"""Divide a study into work items: a few lanes of one shape each, and their results.
 
-A worker gets one item at a time and answers with rows (one a lane, for `results.csv`) and arrays. A lane that fails
-is a row that says so.
+A worker gets one item at a time and returns rows (one per lane, for `results.csv`) and arrays. A lane that fails
+yields a row with the error.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 STEPS_PER_ITEM = 1_700_000
-"""About a tenth of a second of work: enough to hide the hand-over, little enough to lose on an interruption."""
+"""About 0.1 s of work: enough to hide the cost of the transfer, little enough to lose on an interruption."""
 MOST_LANES_PER_ITEM = 1000
 
 Row = dict[str, str | int | float]
@@ -39,7 +39,7 @@ COLUMNS = PARAMETER_COLUMNS + RESULT_COLUMNS
 
 
 class LaneItem(msgspec.Struct, frozen=True):
-    """Some consecutive cases of one shape; `first` is the study's number of the first."""
+    """Some consecutive cases of one shape; `first` is the number of the first in the study."""
 
     first: int
     cases: tuple[Case, ...]
@@ -47,14 +47,14 @@ class LaneItem(msgspec.Struct, frozen=True):
 
 
 class Part(msgspec.Struct, frozen=True):
-    """What came of one item: a row for each case, and named arrays."""
+    """The result of one item: a row for each case, and named arrays."""
 
     rows: list[Row]
     arrays: dict[str, NDArray[np.float64]]
 
 
 def cut(study: Study) -> list[LaneItem]:
-    """Cut a study into items. How does not depend on the machine, so that any machine can finish it."""
+    """Cut a study into items, independently of the machine, so that any machine can finish it."""
     size = max(1, min(MOST_LANES_PER_ITEM, STEPS_PER_ITEM // study.timing.steps))
     items: list[LaneItem] = []
     start = 0
@@ -68,23 +68,23 @@ def cut(study: Study) -> list[LaneItem]:
 def run_lane_item(item: LaneItem) -> Part:
     """Run an item's lanes; arrays: `states`, shape (cases, records, 6), NaN after a lane's end.
 
-    Raises EnvironmentFault where numba is missing.
+    Raises EnvironmentFault if numba is missing.
     """
     import numpy as np
 
     try:
         return _run(item)
     except EnvironmentFault:
-        raise  # this machine cannot compute anything: no fault of the case, which another may still run
+        raise  # this machine cannot compute anything: another one may still run the case
     except PushError as error:
-        told = str(error)
-    except Exception as error:  # one bad case must not cost the study; its row names the defect
-        told = f"{type(error).__name__}: {error}"
-    if len(item.cases) > 1:  # which case is it? the others are well
+        message = str(error)
+    except Exception as error:  # one bad case must not abort the study; its row names the defect
+        message = f"{type(error).__name__}: {error}"
+    if len(item.cases) > 1:  # find the failing case; the others are fine
         parts = [run_lane_item(LaneItem(item.first + i, (case,), item.timing)) for i, case in enumerate(item.cases)]
         states = np.concatenate([part.arrays["states"] for part in parts])
         return Part([row for part in parts for row in part.rows], {"states": states})
-    return Part([_failed(item.first, item.cases[0], told)], {"states": np.full((1, item.timing.records, 6), np.nan)})
+    return Part([_failed(item.first, item.cases[0], message)], {"states": np.full((1, item.timing.records, 6), np.nan)})
 
 
 def _run(item: LaneItem) -> Part:

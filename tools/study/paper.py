@@ -1,4 +1,4 @@
-"""The paper's simulation study: Table I, 2 x 243 pushes of ten simulated minutes.
+"""Define the paper's simulation study: Table I, 2 x 243 pushes of ten simulated minutes.
 
 Source: Heins & Schoellig, "Robust Single-Point Pushing with Force Feedback", section IV and Table I.
 """
@@ -14,11 +14,11 @@ import msgspec
 from tools.study.grid import Case, Study, TimeTable, product, timing_of
 
 SAMPLE_START = {"y0_m": -0.4, "phi0_rad": -math.pi / 8, "s0_m": -0.4, "pressure": "uniform"}
-"""Start of the paper's four sample trajectories; each shape without contact friction and with 1."""
+"""Start of the paper's four sample trajectories; each shape with contact friction 0 and 1."""
 
 
 def paper_study(changes: Mapping[str, Any], dt_s: float | None = None) -> Study:
-    """Return Table I in the order shape, tau_max, mu, y0, phi0, s0, with `changes` (gains, controller) to all."""
+    """Return Table I ordered by shape, tau_max, mu, y0, phi0, s0, with `changes` (gains, controller) in all cases."""
     cases = tuple(
         msgspec.convert({**combination, **changes}, Case)
         for combination in product(
@@ -34,7 +34,7 @@ def paper_study(changes: Mapping[str, Any], dt_s: float | None = None) -> Study:
 
 
 def sample_cases(cases: Sequence[Case]) -> list[int]:
-    """Return which of the paper's cases its figure of four samples shows."""
+    """Return the indices of the cases shown in the paper's figure of four samples."""
     return [
         i
         for i, case in enumerate(cases)

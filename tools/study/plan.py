@@ -1,4 +1,4 @@
-"""What `push sweep` needs to know of a study: its items, who runs them, and how their parts become results."""
+"""Describe a study for `push sweep`: its items, the function that runs them, and how parts become results."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ LANE_SOURCES = tuple(
 class Plan(NamedTuple):
     """A study ready to run.
 
-    definition: all that its numbers depend on but the program text, which is `sources`. items: each with `.cases`.
-    prepare: called once here before workers start. write: makes the results from all parts, returns the summary and
-    the lines for people.
+    definition: everything its numbers depend on except the source files in `sources`. items: each with `.cases`.
+    prepare: called once in this process before workers start. write: writes the results from all parts, returns the
+    summary and its readable lines.
     """
 
     name: str
@@ -64,16 +64,16 @@ def lanes_plan(study: Study) -> Plan:
 
 
 def hardware_plan(gains: tuple[float, float] | None, dt_s: float | None, open_loop: bool) -> Plan:
-    """Return the plan of the simulated experiment. Raises UsageError for unfit flags, ConfigError for unfit gains."""
+    """Return the plan of the simulated experiment. Raises UsageError for wrong flags, ConfigError for wrong gains."""
     check_flags(dt_s, open_loop)
     items = hardware_items(gains)
-    rig_of(items[0])  # gains that no rig may have are found before anything runs
+    rig_of(items[0])  # report invalid gains before anything runs
     definition = msgspec.to_builtins(items)
     return Plan("hardware", definition, sources(ROOT), items, run_hardware_item, _nothing, _write_hardware)
 
 
 def compile_kernel() -> None:
-    """Compile the lanes' kernel once, here, so that the workers find it in numba's cache."""
+    """Compile the lane kernel once in this process, so that workers find it in numba's cache."""
     from sim_backend.physics.batch import run_batch
     from sim_backend.physics.lanes import Lane, Timing
 
@@ -81,7 +81,7 @@ def compile_kernel() -> None:
 
 
 def _nothing() -> None:
-    """Prepare nothing."""
+    """Do nothing: this study needs no preparation."""
 
 
 def _write_lanes(study: Study, store: Store, parts: list[Part]) -> tuple[dict[str, Any], list[str]]:

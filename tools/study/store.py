@@ -1,7 +1,7 @@
-"""The folder of a study: what is finished stays, whatever happens; nothing foreign is ever overwritten.
+"""Store a study in a folder: finished work survives interruptions, and files of others are never overwritten.
 
-`study.json` says what the study is (with a fingerprint of everything its numbers depend on), `parts/` holds one file
-an item, written whole or not at all, and the results are assembled from the parts in the order of the cases.
+`study.json` identifies the study (with a fingerprint of everything its numbers depend on), `parts/` contains one file
+per item, written atomically, and the results are assembled from the parts in the order of the cases.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STUDY_FILE = "study.json"
 
 
 def fingerprint(what: object, sources: Sequence[Path]) -> str:
-    """Return a digest of a study's definition and of the program text its numbers come from."""
+    """Return a digest of a study's definition and of the source files its numbers come from."""
     digest = hashlib.sha256(json.dumps(what, sort_keys=True).encode())
     for source in sources:
         digest.update(source.read_bytes())
@@ -35,8 +35,8 @@ def fingerprint(what: object, sources: Sequence[Path]) -> str:
 class Store:
     """A study's folder. Raises UsageError if it cannot be used.
 
-    out: the folder, made if need be. mark: the study's fingerprint. resume: whether to go on with
-    what is there (nothing at all is fine, so that a job that may be restarted can always say so).
+    out: the folder, created if missing. mark: the study's fingerprint. resume: whether to continue an
+    existing study (an empty folder is accepted, so that a restartable job can always set it).
     """
 
     def __init__(self, out: Path, name: str, mark: str, *, resume: bool) -> None:
@@ -45,13 +45,13 @@ class Store:
         found = _found(out)
         if found is not None and found != mark:
             raise UsageError(
-                "this folder holds another study (or one of another version of the program)",
+                "this folder contains another study (or one by another version of the program)",
                 where=str(out),
                 do="Give another --out",
             )
         if found is not None and not resume:
             raise UsageError(
-                "this folder already holds this study", where=str(out), do="Add --resume, or give another --out"
+                "this folder already contains this study", where=str(out), do="Add --resume, or give another --out"
             )
         try:
             (out / "parts").mkdir(parents=True, exist_ok=True)
@@ -64,17 +64,17 @@ class Store:
             ) from None
 
     def finished(self, items: int) -> set[int]:
-        """Return the numbers of the items whose parts are here and whole."""
+        """Return the numbers of the items whose parts are present and intact."""
         return {index for index in range(items) if self._read(index) is not None}
 
     def save(self, index: int, part: Part) -> None:
-        """Keep the part of one item."""
+        """Save the part of one item."""
         rows = np.frombuffer(json.dumps(part.rows).encode(), dtype=np.uint8)
         mark = np.frombuffer(self._mark.encode(), dtype=np.uint8)
         self.write_bytes(f"parts/{index:06d}.npz", _npz({"mark": mark, "rows": rows, **part.arrays}))
 
     def load(self, items: int) -> list[Part]:
-        """Return all parts in order; every one must be finished."""
+        """Return all parts in order; every item must be finished."""
         parts = [self._read(index) for index in range(items)]
         return [part for part in parts if part is not None]
 
@@ -91,11 +91,11 @@ class Store:
         self.write_bytes(name, _npz(arrays))
 
     def write_json(self, name: str, value: object) -> None:
-        """Write JSON for people and programs."""
+        """Write indented JSON."""
         write_json(self.out / name, value)
 
     def write_bytes(self, name: str, content: bytes) -> None:
-        """Write a file whole or not at all."""
+        """Write a file atomically."""
         write_whole(self.out / name, content)
 
     def _read(self, index: int) -> Part | None:
@@ -107,7 +107,7 @@ class Store:
                 return None
             return Part(json.loads(arrays.pop("rows").tobytes()), arrays)
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return None  # not there, or damaged: it is simply run again
+            return None  # missing or damaged: the item is run again
 
 
 def _found(out: Path) -> str | None:

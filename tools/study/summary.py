@@ -1,4 +1,4 @@
-"""What a study came to: how its lanes ended, and the distributions behind the word "converged"."""
+"""Summarise a study: how its lanes ended, and the distributions behind the word "converged"."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 CONVERGED_M = 0.05
 """A lane counts as converged when |y| and |y_c| end below this (the response is a slow, damped oscillation) ..."""
 CONVERGED_HEADING_DEG = 1.0
-"""... and the slider's centre moved in a direction this close to the path's over the last kept interval."""
+"""... and the slider's centre moved in a direction this close to the path's over the last recorded interval."""
 
 
 def summarise(study: Study, rows: Sequence[Row], states: Floats) -> dict[str, Any]:
@@ -40,7 +40,7 @@ def summarise(study: Study, rows: Sequence[Row], states: Floats) -> dict[str, An
 
 
 def sentences(summary: dict[str, Any]) -> list[str]:
-    """Return the summary as lines for people."""
+    """Return the summary as readable lines."""
     lines = [f"{summary['converged']} of {summary['lanes']} lanes converged ({summary['converged_when']})"]
     for shape, outcome in summary["shapes"].items():
         ended = ", ".join(f"{count} {code}" for code, count in outcome["ended"].items() if count)
@@ -55,8 +55,8 @@ def sentences(summary: dict[str, Any]) -> list[str]:
         ):
             values = outcome[f"{name}_{unit}"]
             if values is not None:
-                told = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
-                lines.append(f"  {name.replace('_', ' ')}: {told} {unit}")
+                figures = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
+                lines.append(f"  {name.replace('_', ' ')}: {figures} {unit}")
     return lines
 
 
@@ -86,7 +86,7 @@ def _outcome(study: Study, chosen: list[int], rows: Sequence[Row], states: Float
 
 
 def contact_y(case: Case, row: Row) -> float:
-    """Return the lateral place of the contact at a lane's end (m)."""
+    """Return the lateral position of the contact at a lane's end (m)."""
     y, phi, s = float(row["y"]), float(row["phi"]), float(row["s"])
     if case.shape == "circle":
         return y - case.radius_m * math.sin(phi - s / case.radius_m)
@@ -94,7 +94,7 @@ def contact_y(case: Case, row: Row) -> float:
 
 
 def _heading_deg(states: Floats) -> float:
-    """Return the direction of the centre's last kept move (a lane that kept one state has gone nowhere: 0)."""
+    """Return the direction of the centre's last recorded move (0 if only one state was recorded)."""
     if len(states) < 2:
         return 0.0
     dx, dy = (states[-1] - states[-2])[:2].tolist()
@@ -102,7 +102,7 @@ def _heading_deg(states: Floats) -> float:
 
 
 def spread(values: Sequence[float]) -> dict[str, float] | None:
-    """Return median, 90th percentile and greatest of some values, or None for none."""
+    """Return median, 90th percentile and maximum of some values, None if there are none."""
     if not values:
         return None
     ordered = sorted(values)

@@ -1,4 +1,4 @@
-"""The picture of `push tune`: which gains are stable for all assumed sliders, with known gains marked."""
+"""Draw the map of `push tune`: which gains are stable for all assumed sliders, with known gains marked."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ PRESETS = {
     "authors' rigid-body simulation": (0.3, 0.1),
     "this program's rigs": (0.3, 0.2),
 }
-"""Gains (k_f, k_y in rad/m) people will want to find on the map (Heins & Schoellig, both papers and their code)."""
+"""Well-known gains (k_f, k_y in rad/m) marked on the map (Heins & Schoellig, both papers and their code)."""
 
 
 def draw(limits: Sequence[tuple[float, float]], recommended: tuple[float, float], what: str) -> Figure:
-    """Draw the map. `limits`: greatest stable k_y for each k_f. `what`: the assumed sliders in a few words."""
+    """Draw the map. `limits`: maximum stable k_y for each k_f. `what`: the assumed sliders in a few words."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -32,7 +32,7 @@ def draw(limits: Sequence[tuple[float, float]], recommended: tuple[float, float]
     k_y = [max(point[1], 0.0) for point in limits]
     top = 1.15 * max(*k_y, *(gains[1] for gains in PRESETS.values()))
     axes.fill_between(k_f, k_y, top, color="tab:red", alpha=0.15, label="oscillates or diverges for some slider")
-    axes.fill_between(k_f, [WARN_SHARE * v for v in k_y], k_y, color="tab:orange", alpha=0.25, label="little margin")
+    axes.fill_between(k_f, [WARN_SHARE * v for v in k_y], k_y, color="tab:orange", alpha=0.25, label="small margin")
     axes.fill_between(k_f, 0.0, [WARN_SHARE * v for v in k_y], color="tab:green", alpha=0.2, label="stable for all")
     for name, (f, y) in PRESETS.items():
         axes.plot(f, y, "ko", markersize=4)

@@ -51,9 +51,9 @@ def test_cat_and_export_read_what_middleware_writes(tmp_path, capsys, text, payl
 
 
 UNREADABLE = {
-    "/json": (by_hand.channel(2, 0, "/json", "json"), b"{}", "its messages are json, and only cdr"),
-    "/ros1": (by_hand.channel(3, 1, "/ros1", "ros1"), b"", "its messages are ros1, and only cdr"),
-    "/protobuf": (by_hand.channel(4, 1, "/protobuf", "protobuf"), b"", "its messages are protobuf, and only cdr"),
+    "/json": (by_hand.channel(2, 0, "/json", "json"), b"{}", "its messages are in json; only cdr"),
+    "/ros1": (by_hand.channel(3, 1, "/ros1", "ros1"), b"", "its messages are in ros1; only cdr"),
+    "/protobuf": (by_hand.channel(4, 1, "/protobuf", "protobuf"), b"", "its messages are in protobuf; only cdr"),
     "/bare": (by_hand.channel(5, 0, "/bare"), HELLO, "it has no schema"),
     "/xcdr2": (by_hand.channel(6, 1, "/xcdr2"), b"\x00\x07" + HELLO[2:], "CDR of version 2"),
     "/short": (by_hand.channel(7, 1, "/short"), HELLO[:9], "elements cannot fit"),
@@ -83,7 +83,7 @@ def test_topics_that_cannot_be_read_are_named_with_the_reason_and_the_rest_is_re
     assert main(["log", "info", str(mixed)]) == 0
     out = capsys.readouterr().out
     assert "8 messages, whole" in out
-    assert "/json cannot be read: its messages are json" in out
+    assert "/json cannot be read: its messages are in json" in out
 
 
 @pytest.mark.parametrize("topic", UNREADABLE)

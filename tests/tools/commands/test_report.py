@@ -31,7 +31,7 @@ from tools.report import process as report_process
 from tools.report.page import page, run_mark, write_report
 from tools.report.process import ReportProcess
 from tools.report.run_data import read_run
-from tools.report.words import baseline_of, differences, tiles, verdict
+from tools.report.run_summary import baseline_of, differences, tiles, verdict
 
 ROOT = Path(__file__).resolve().parents[3]
 EVIL = "<script>alert(1)</script>\"'&$(x) \\frac{ \x1b[31m"
@@ -158,7 +158,7 @@ def test_the_numbers_are_those_of_the_log(ran, ticks):
         for reading in tick.input.ft.readings[-1:]
     ]
     assert np.nanmax(run.ticks["force_raw"]) == pytest.approx(max(raw))
-    assert dict(tiles(run))["greatest force"] == f"{max(raw):.1f} N"
+    assert dict(tiles(run))["maximum force"] == f"{max(raw):.1f} N"
     assert run.slider_source == "world"
     assert run.slider["x_m"][-1] - run.slider["x_m"][0] == pytest.approx(0.2, abs=0.03)
     assert run.modes[0].begin_s == 0.0
@@ -188,7 +188,7 @@ def test_a_hardware_log_without_a_world_and_with_hostile_names(ran, ticks, tmp_p
     assert "\x1b" not in text
     assert "alert(1)" in seen.words["dd"] + seen.words["p"]
     assert len(seen.pictures) == 6
-    assert "Where the object was is not known" in text
+    assert "The pose of the object is unknown" in text
     assert "Settings that differ from" in text
     assert baseline_of(rig) == "thing"
 
@@ -209,7 +209,7 @@ def test_a_log_without_a_tick(ran, tmp_path):
     log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), [])
     write_report(log, tmp_path / "report.html")
     seen = assert_self_contained((tmp_path / "report.html").read_text())
-    assert seen.words["h1"] == "Never began"
+    assert seen.words["h1"] == "Did not start"
     assert len(seen.pictures) == 6
 
 

@@ -69,7 +69,7 @@ def test_since_takes_lines_that_changed(tmp_path, monkeypatch):
     monkeypatch.setattr(choose, "ROOT", tmp_path)
     mutants = find_mutants("x.py", file.read_bytes())
     assert [m.after for m in choose.changed_since(mutants, "HEAD")] == ["B = 6"]
-    with pytest.raises(choose.NoSuchCommit, match="nowhere"):
+    with pytest.raises(choose.UnknownCommit, match="nowhere"):
         choose.changed_since(mutants, "nowhere")
 
 

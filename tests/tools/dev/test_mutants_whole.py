@@ -138,7 +138,7 @@ def test_interrupted_it_goes_on_where_it_was(project):
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130, said
-    assert "goes on from there" in said
+    assert "continues from there" in said
     begun = [one["id"] for one in tried(project)]
     assert run(project).returncode == 0  # the tests of this law leave nothing out
     names = [one["id"] for one in tried(project)]

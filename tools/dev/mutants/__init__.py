@@ -1,1 +1,1 @@
-"""`make mutants`: changes our code one place at a time and says which changes no test notices; start at `__main__`."""
+"""`make mutants`: change the code in one place at a time and list the changes no test notices; start at `__main__`."""

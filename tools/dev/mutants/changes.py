@@ -1,4 +1,4 @@
-"""The changes that are tried on one syntax node: pure text for text, by kind of node."""
+"""Define the changes made to one syntax node: replacement texts by kind of node."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ NAMES = {
     "ceil": "floor",
 }
 SMALL_INT = 16
-"""Up to here an integer is a count or an index and changes by one; above, and for floats, it is a quantity."""
+"""Integers up to this are counts or indexes and change by one; larger ones, and floats, are quantities."""
 QUANTITY_FACTOR = 1.5
 
 
 def constants(value: object) -> Iterator[str]:
-    """Yield what a constant is replaced by; strings and None stay."""
+    """Yield replacements of a constant; strings and None have none."""
     if isinstance(value, bool):
         yield repr(not value)
     elif isinstance(value, int):
@@ -67,7 +67,7 @@ def constants(value: object) -> Iterator[str]:
 
 
 def returned(value: ast.expr) -> Iterator[str]:
-    """Yield constants that are returned instead of `value`; a returned constant is changed where it stands."""
+    """Yield constants to return instead of `value`; a returned constant is itself changed elsewhere."""
     if isinstance(value, ast.Compare | ast.BoolOp) or (
         isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.Not)
     ):
@@ -77,19 +77,19 @@ def returned(value: ast.expr) -> Iterator[str]:
 
 
 def can_be_negated(test: ast.expr) -> bool:
-    """Return whether a condition has no operator of its own that is changed already."""
+    """Return whether a condition has no operator that is changed anyway."""
     return not isinstance(test, ast.Compare | ast.BoolOp | ast.Constant) and not (
         isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
     )
 
 
 def is_text(node: ast.expr) -> bool:
-    """Return whether the node is visibly a string, whose `+` and `%` are words and not arithmetic."""
+    """Return whether the node is visibly a string, whose `+` and `%` are not arithmetic."""
     return isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str))
 
 
 def can_be_dropped(statement: ast.stmt, assigned: dict[str, int]) -> bool:
-    """Return whether the program still has all its names without the statement; `assigned` counts assignments."""
+    """Return whether every name is still assigned without the statement; `assigned` counts assignments."""
     if isinstance(statement, ast.Expr):
         return not isinstance(statement.value, ast.Constant)
     if isinstance(statement, ast.Return):
@@ -101,7 +101,7 @@ def can_be_dropped(statement: ast.stmt, assigned: dict[str, int]) -> bool:
 
 
 def count_assignments(function: ast.FunctionDef) -> dict[str, int]:
-    """Return how often each name of a function gets a value, as an argument or in its body."""
+    """Return how often each name in a function is assigned, as an argument or in the body."""
     counts: dict[str, int] = {}
     for node in ast.walk(function):
         if isinstance(node, ast.arg):

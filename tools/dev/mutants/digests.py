@@ -1,4 +1,4 @@
-"""What a result depends on, as digests: a changed file makes it worthless."""
+"""Digests of what a result depends on: a changed file invalidates it."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from tools.dev.mutants.targets import PRODUCT, ROOT
 
 @functools.cache
 def of_file(path: str) -> str:
-    """Return a digest of a file of the checkout as it is now."""
+    """Return a digest of a file in the checkout as it is now."""
     return hashlib.sha256((ROOT / path).read_bytes()).hexdigest()
 
 
 @functools.cache
 def of_helpers() -> str:
-    """Return a digest of all files in tests that are no tests: each may be used by any test."""
+    """Return a digest of all helper files in tests: any test may use them."""
     return of_files(name for name in _python_files("tests") if not Path(name).name.startswith("test_"))
 
 
 @functools.cache
 def of_product() -> str:
-    """Return a digest of the code that tests run."""
+    """Return a digest of the code under test."""
     return of_files(name for folder in PRODUCT for name in _python_files(folder) if not name.startswith("tools/dev/"))
 
 
 def of_files(names: Iterable[str]) -> str:
-    """Return one digest of several files, whatever their order."""
+    """Return one digest of several files, independent of their order."""
     digest = hashlib.sha256()
     for name in sorted(names):
         digest.update(f"{name} {of_file(name)}\n".encode())
@@ -37,7 +37,7 @@ def of_files(names: Iterable[str]) -> str:
 
 
 def of_tests(names: Iterable[str]) -> str:
-    """Return a digest of test files and of what they may use."""
+    """Return a digest of test files and the helpers they may use."""
     return hashlib.sha256(f"{of_files(names)} {of_helpers()}".encode()).hexdigest()
 
 

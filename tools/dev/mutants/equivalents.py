@@ -1,4 +1,4 @@
-"""The list of mutants that no test can notice, each with the reason."""
+"""Read the list of equivalent mutants, which no test can notice, each with the reason."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import msgspec
 
 
 class Equivalent(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One entry: the mutant as it was printed, and why nothing observable changes."""
+    """One entry: the mutant as printed, and why nothing observable changes."""
 
     path: str
     function: str
-    """Qualified name, as `Gate.step`; empty at module or class level."""
+    """Qualified name, such as `Gate.step`; empty at module or class level."""
     before: str
     after: str
     reason: str
 
     @property
     def place(self) -> tuple[str, str, str, str]:
-        """What it has in common with a mutant."""
+        """Identity shared with the mutant: path, function, before, after."""
         return self.path, self.function, self.before, self.after
 
 
@@ -29,11 +29,11 @@ class _Listed(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class BadList(Exception):
-    """The list cannot be read; the text says why."""
+    """The list is invalid; the message says why."""
 
 
 def read_equivalents(file: Path) -> list[Equivalent]:
-    """Return the entries of the list; raises BadList, also for an entry without a reason or one given twice."""
+    """Return the entries of the list; raises BadList, also for a duplicate entry or one without a reason."""
     try:
         listed = msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), _Listed).equivalent
     except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:

@@ -1,4 +1,4 @@
-"""Every mutant of a source text, in the order of the file. Annotations, decorators, strings and messages stay."""
+"""Find every mutant of a source file, in file order. Annotations, decorators, strings and messages are not changed."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _ATOMS = (ast.Name, ast.Attribute, ast.Call, ast.Constant, ast.Subscript)
 
 
 def find_mutants(path: str, source: bytes) -> list[Mutant]:
-    """Return all mutants of one file that can be compiled; `path` only names it.
+    """Return all mutants of one file that compile; `path` is only its name.
 
-    Raises SyntaxError where the source itself cannot be.
+    Raises SyntaxError if the source itself does not compile.
     """
     finder = _Finder(path, source)
     finder.visit(ast.parse(source))
@@ -51,7 +51,7 @@ class _Finder(ast.NodeVisitor):
         return self.offsets[node.lineno - 1] + node.col_offset, self.offsets[node.end_lineno - 1] + node.end_col_offset
 
     def text(self, node: ast.expr) -> str:
-        """Return a node's source, in brackets where another place may need them."""
+        """Return a node's source, in parentheses where another position may need them."""
         start, end = self.span(node)
         text = self.source[start:end].decode()
         return text if isinstance(node, _ATOMS) else f"({text})"
@@ -82,7 +82,7 @@ class _Finder(ast.NodeVisitor):
         self.replace(*self.span(node), text)
 
     def replace_between(self, left: ast.expr, right: ast.expr, old: str, new: str) -> None:
-        """Replace the operator between two operands; only blanks and brackets can stand beside it."""
+        """Replace the operator between two operands; only blanks and parentheses can be beside it."""
         start, end = self.span(left)[1], self.span(right)[0]
         at = self.source.find(old.encode(), start, end)
         if at >= 0:
@@ -120,13 +120,13 @@ class _Finder(ast.NodeVisitor):
             self.visit(node.value)
 
     def visit_Raise(self, node: ast.Raise) -> None:
-        """Leave what is raised: its words and numbers are for a person."""
+        """Skip raised errors: their text and numbers are for people."""
 
     def visit_Assert(self, node: ast.Assert) -> None:
-        """Leave assertions: they help the type checker."""
+        """Skip assertions: they help the type checker."""
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
-        """Leave formatted text: words for a person."""
+        """Skip formatted text: it is for people."""
 
     def visit_Break(self, node: ast.Break) -> None:
         self.replace_node(node, "continue")

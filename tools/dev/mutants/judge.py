@@ -1,4 +1,4 @@
-"""Whether a test notices a mutant."""
+"""Judge whether a test notices a mutant."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from tools.dev.mutants.session import run_tests
 from tools.dev.mutants.tree import Tree
 
 FIRST_S = 0.5
-"""The quickest tests, of this many seconds together and of few files, go first: most mutants get no further."""
+"""The quickest tests, up to this total time and from few files, run first: most mutants are killed by them."""
 FIRST_FILES = 3
 SLOWER = 10.0
-"""A mutant's tests may take this many times as long as without it, and 10 s more, before it counts as noticed."""
+"""A mutant's tests may take this many times as long as without it, plus `MORE_S`, before it counts as a timeout."""
 MORE_S = 10.0
 
 
 class Trial(NamedTuple):
-    """A mutant and the tests that it must meet, by name, or whole files in the order they are to run."""
+    """A mutant and the tests to run against it: tests by name, or complete files in this order."""
 
     mutant: Mutant
     tests: list[str]
@@ -25,7 +25,7 @@ class Trial(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What came of a mutant."""
+    """The result for one mutant."""
 
     outcome: str
     """killed, timeout (which counts as killed), survived or unreached."""
@@ -34,13 +34,13 @@ class Verdict(NamedTuple):
 
 
 class Judge:
-    """Judges one mutant after the other, and remembers which tests were sharp."""
+    """Judges one mutant after another, and remembers which tests killed most."""
 
     def __init__(self) -> None:
         self._kills: dict[str, dict[str, int]] = {}
 
     def __call__(self, tree: Tree, trial: Trial) -> Verdict:
-        """Run the tests in a tree in which the mutant stands."""
+        """Run the tests in a tree to which the mutant is applied."""
         if not trial.tests:
             return Verdict("unreached", "")
         mutant = trial.mutant
@@ -55,17 +55,17 @@ class Judge:
     def _run(self, tree: Tree, trial: Trial, batch: list[str]) -> Verdict:
         limit_s = MORE_S + SLOWER * sum(trial.seconds.get(test, 0.0) for test in batch)
         files = list(dict.fromkeys(_file(test) for test in batch))
-        ended = run_tests(tree.root, files, batch if "::" in batch[0] else None, limit_s)
-        if ended.passed:
+        result = run_tests(tree.root, files, batch if "::" in batch[0] else None, limit_s)
+        if result.passed:
             return Verdict("survived", "")
-        if not ended.failed:
+        if not result.failed:
             return Verdict("timeout", "")
         kills = self._kills.setdefault(trial.mutant.path, {})
-        kills[ended.failed[0]] = kills.get(ended.failed[0], 0) + 1
-        return Verdict("killed", ended.failed[0])
+        kills[result.failed[0]] = kills.get(result.failed[0], 0) + 1
+        return Verdict("killed", result.failed[0])
 
     def _batches(self, trial: Trial) -> list[list[str]]:
-        """Return the tests in two batches, those that killed mutants of this file first; whole files one by one."""
+        """Return the tests in two batches, those that killed mutants of this file first; complete files one by one."""
         if "::" not in trial.tests[0]:
             return [[file] for file in trial.tests]
         kills = self._kills.get(trial.mutant.path, {})
@@ -89,6 +89,6 @@ def _file(test: str) -> str:
 
 
 def _by_file(tests: list[str]) -> list[str]:
-    """Return the tests with those of one file together: a file's fixtures are set up once."""
+    """Return the tests grouped by file, so that a file's fixtures are set up once."""
     order = {file: i for i, file in enumerate(dict.fromkeys(map(_file, tests)))}
     return sorted(tests, key=lambda test: order[_file(test)])

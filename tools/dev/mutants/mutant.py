@@ -1,4 +1,4 @@
-"""One change to one place of one file."""
+"""One change in one place of one file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Mutant(NamedTuple):
     """The lines of the changed expression; a test reaches the mutant when it runs one of them."""
     statement_line: int
     function: str
-    """Qualified name, as `Gate.step`; empty where the code runs at import."""
+    """Qualified name, such as `Gate.step`; empty if the code runs at import."""
     start: int
     end: int
     text: str
@@ -24,12 +24,12 @@ class Mutant(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What a person reads: where, and what became of it."""
+        """Readable name: location, and source before and after."""
         return f"{self.path}:{self.line}: {self.before} -> {self.after}"
 
     @property
     def place(self) -> tuple[str, str, str, str]:
-        """What stays the same while lines above it move: path, function, before, after."""
+        """Identity independent of line numbers: path, function, before, after."""
         return self.path, self.function, self.before, self.after
 
     def apply(self, source: bytes) -> bytes:

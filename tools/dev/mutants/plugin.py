@@ -1,4 +1,4 @@
-"""What pytest does differently for a mutant: only the chosen tests, in the chosen order; notes who noticed it."""
+"""Pytest plugins for mutants: run the chosen tests in the chosen order, record failures and coverage."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ import pytest
 PROFILE = "mutants"
 
 
-class Chosen:
-    """Runs the tests named in `wanted`, in that order, and notes which fail."""
+class ChosenTests:
+    """Runs the tests named in `wanted`, in that order, and records which fail."""
 
     def __init__(self, wanted: list[str] | None) -> None:
-        """`wanted` None stands for every collected test."""
+        """wanted: names of tests; None means every collected test."""
         self.wanted = wanted
         self.failed: list[str] = []
         self.seconds: dict[str, float] = {}
 
     def pytest_collection(self) -> None:
-        """Set Hypothesis to the same examples every time and no search for a smaller one."""
+        """Make Hypothesis use the same examples every time, without shrinking."""
         phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
         hypothesis.settings.register_profile(PROFILE, derandomize=True, database=None, phases=phases)
         hypothesis.settings.load_profile(PROFILE)
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Keep the wanted ones; of a file in which one is missing (a mutant can rename its parameters), all."""
+        """Keep the wanted tests, or all tests of a file that lacks one (a mutant can rename its parameters)."""
         if self.wanted is None:
             return
         order = {name: i for i, name in enumerate(self.wanted)}
@@ -38,26 +38,26 @@ class Chosen:
         items[:] = sorted(kept, key=lambda item: order.get(item.nodeid, len(order)))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note time and failure of one step of a test."""
+        """Record duration and failure of one phase of a test."""
         self.seconds[report.nodeid] = self.seconds.get(report.nodeid, 0.0) + report.duration
         if report.failed:
             self.failed.append(report.nodeid)
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Note a file that can no longer be imported."""
+        """Record a file that can no longer be imported."""
         if report.failed:
             self.failed.append(report.nodeid)
 
 
-class Reach:
-    """Tells the coverage tracer which test runs."""
+class CoverageContexts:
+    """Tells the coverage tracer which test is running."""
 
     def __init__(self, tracer: Any) -> None:
         self.tracer = tracer
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:
-        """Count what runs until the test ends, fixtures too, as reached by it."""
+        """Attribute all lines run until the test ends, including fixtures, to it."""
         self.tracer.switch_context(item.nodeid)
         with contextlib.ExitStack() as stack:
             stack.callback(self.tracer.switch_context, "")

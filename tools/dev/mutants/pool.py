@@ -1,4 +1,4 @@
-"""Worker processes, each with a copied tree, that take one job after the other."""
+"""Run jobs in worker processes, each with its own copy of the tree."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _PDEATHSIG = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
 
 
-def work(jobs: Sequence[Job], handle: Callable[[Tree, Job], Answer], workers: int) -> Iterator[tuple[Job, Answer]]:
-    """Yield each job with its answer as it comes; `handle` runs in a worker.
+def run_jobs(jobs: Sequence[Job], handle: Callable[[Tree, Job], Answer], workers: int) -> Iterator[tuple[Job, Answer]]:
+    """Yield each job with its answer as it arrives; `handle` runs in a worker.
 
-    Raises RuntimeError when a worker dies. Closing the iterator ends the workers and removes their trees.
+    Raises RuntimeError if a worker dies. Closing the iterator ends the workers and removes their trees.
     """
     waiting = iter(range(len(jobs)))
     with tempfile.TemporaryDirectory(prefix="mutants-", ignore_cleanup_errors=True) as folder:
@@ -42,9 +42,7 @@ def work(jobs: Sequence[Job], handle: Callable[[Tree, Job], Answer], workers: in
                     try:
                         index, answer = pickle.load(links[link][1])
                     except EOFError:
-                        raise RuntimeError(
-                            f"a worker ended in the middle of its work (process {links[link][0]})"
-                        ) from None
+                        raise RuntimeError(f"a worker died during a job (process {links[link][0]})") from None
                     following = next(waiting, None)
                     if following is None:
                         busy.remove(link)
@@ -74,7 +72,7 @@ def _start(
         return ours, pid
     code = 1
     try:
-        for link in (ours, *others):  # a worker that held another's end open would keep it from seeing ours close
+        for link in (ours, *others):  # a worker holding another's end open would keep it from noticing that ours closed
             link.close()
         ctypes.CDLL(None).prctl(_PDEATHSIG, signal.SIGINT, 0, 0, 0)
         if os.getppid() == parent:

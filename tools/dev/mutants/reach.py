@@ -1,4 +1,4 @@
-"""Which tests run which lines, and how long they take: measured once for each test file, then kept."""
+"""Measure which tests run which lines, and how long they take; results are kept for each test file."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any
 
 from tools.dev.mutants import digests
 from tools.dev.mutants.mutant import Mutant
-from tools.dev.mutants.pool import work
+from tools.dev.mutants.pool import run_jobs
 from tools.dev.mutants.session import run_tests
 from tools.dev.mutants.targets import WHOLE, WHOLE_TESTS
 from tools.dev.mutants.tree import Tree
 
 PATIENCE_S = 12.0
-"""Of the tests that reach a mutant, the quickest that together take this long are run."""
+"""Of the tests that reach a mutant, the quickest are run, up to this total time."""
 FILE_LIMIT_S = 900.0
 Measured = dict[str, Any]
 """`seconds`: test to s; `reach`: test to file to lines; `failed`: names of tests."""
 
 
 class TestsFail(Exception):
-    """Tests fail without any mutant; the text names them."""
+    """Tests fail without any mutant; the message names them."""
 
 
 class Reach:
-    """Answers which tests meet a mutant, the quickest first."""
+    """Tells which tests reach a mutant, the quickest first."""
 
     def __init__(self, measured: list[Measured]) -> None:
         self.seconds: dict[str, float] = {}
@@ -41,16 +41,16 @@ class Reach:
     def tests_for(self, mutant: Mutant) -> list[str]:
         """Return the tests that run the mutant's lines.
 
-        What runs at import belongs to no test: the tests of the module's functions come first, then all others.
+        Code run at import belongs to no test: the tests of the module's functions come first, then all others.
         """
         lines = self._tests.get(mutant.path, {})
         if mutant.function:
             wanted = {mutant.statement_line, *range(mutant.line, mutant.last_line + 1)}
-            return self._patiently(set().union(*(lines.get(line, set()) for line in wanted)), set())
+            return self._within_patience(set().union(*(lines.get(line, set()) for line in wanted)), set())
         near: set[str] = set().union(*lines.values())
-        return self._patiently(near, self.seconds.keys() - near)
+        return self._within_patience(near, self.seconds.keys() - near)
 
-    def _patiently(self, near: set[str], far: set[str]) -> list[str]:
+    def _within_patience(self, near: set[str], far: set[str]) -> list[str]:
         chosen: list[str] = []
         left_s = PATIENCE_S
         for group in (near, far):
@@ -63,7 +63,7 @@ class Reach:
 
 
 def measure(folder: Path, workers: int) -> Reach:
-    """Return the reach of all tests of the whole parts; `folder` keeps the measurements that are still true.
+    """Return the reach of the tests of completely mutated parts; `folder` stores measurements for later sessions.
 
     Raises TestsFail.
     """
@@ -71,7 +71,7 @@ def measure(folder: Path, workers: int) -> Reach:
     kept = folder / "reach"
     kept.mkdir(parents=True, exist_ok=True)
     places = {file: kept / f"{_key(file)}.json" for file in files}
-    for file, one in work([file for file in files if not places[file].exists()], _measure_file, workers):
+    for file, one in run_jobs([file for file in files if not places[file].exists()], _measure_file, workers):
         if one["failed"] or not one["seconds"]:
             raise TestsFail(", ".join(one["failed"]) or file)
         places[file].write_text(json.dumps(one))
@@ -86,10 +86,10 @@ def _key(file: str) -> str:
 
 
 def _measure_file(tree: Tree, file: str) -> Measured:
-    """Time the tests as they are, then trace them: traced ones are several times slower."""
+    """Time the tests without tracing, then trace them, which is several times slower."""
     timed = run_tests(tree.root, [file], None, FILE_LIMIT_S, stop=False)
     failed = timed.failed
-    if failed:  # what a busy machine disturbs passes alone
+    if failed:  # a test disturbed by a busy machine passes when run alone
         failed = run_tests(tree.root, [file], failed, FILE_LIMIT_S, stop=False).failed
     globs = ",".join(f"{tree.root}/{glob}" for glob in WHOLE)
     traced = run_tests(tree.root, [file], None, FILE_LIMIT_S, stop=False, measure=globs)

@@ -1,4 +1,4 @@
-"""What earlier sessions found, as one line of JSON each: a session that was ended goes on where it was."""
+"""Store results as lines of JSON, so that an interrupted session continues where it stopped."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tools.dev.mutants.targets import ROOT
 
 
 class Results:
-    """The results that are still true: same source and, of a killed mutant, same killer; otherwise same tests."""
+    """Results that are still valid: neither the source nor the killing test (if none, any test) has changed."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
@@ -21,12 +21,12 @@ class Results:
             for line in file.read_text().splitlines():
                 try:
                     one = json.loads(line)
-                except ValueError:  # the line that was being written when a session was killed
+                except ValueError:  # a line cut short when a session was killed
                     continue
                 self._known[one["id"]] = one
 
     def verdict(self, mutant: Mutant, files: list[str]) -> Verdict | None:
-        """Return what is known of a mutant whose tests are in `files`, or None."""
+        """Return the stored verdict on a mutant whose tests are in `files`, or None."""
         one = self._known.get(_id(mutant))
         if one is None:
             return None
@@ -38,7 +38,7 @@ class Results:
         return Verdict(one["outcome"], one["killer"])
 
     def add(self, mutant: Mutant, verdict: Verdict, files: list[str]) -> None:
-        """Write a result down at once."""
+        """Store a result immediately."""
         killer = verdict.killer.partition("::")[0]
         tests = digests.of_tests([killer] if killer else files)
         one = {
@@ -55,5 +55,5 @@ class Results:
 
 
 def _id(mutant: Mutant) -> str:
-    """A mutant is its place in one content of its file."""
+    """Return an id: the mutant's position in one version of its file."""
     return f"{digests.of_file(mutant.path)[:16]} {mutant.path} {mutant.start} {mutant.end} {mutant.text}"

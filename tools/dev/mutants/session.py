@@ -1,4 +1,4 @@
-"""One run of pytest in a forked process: quick, for libraries are loaded already, and without a trace afterwards."""
+"""Run pytest in a forked process: fast, because libraries are already loaded, and without side effects afterwards."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tools.dev.mutants.plugin import Chosen, Reach
+from tools.dev.mutants.plugin import ChosenTests, CoverageContexts
 from tools.dev.mutants.targets import PRODUCT, ROOT
 
 PRELOADED = (
@@ -30,23 +30,23 @@ PRELOADED = (
 LOADED_BEFORE = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
 OPTIONS = ["-q", "--tb=line", "-p", "no:cacheprovider", "-p", "no:xdist", "-W", LOADED_BEFORE]
 _SUBREAPER = 36
-"""PR_SET_CHILD_SUBREAPER of prctl(2): orphans of a killed test become ours, so that they can be ended too."""
+"""PR_SET_CHILD_SUBREAPER of prctl(2): orphans of a killed test become our children, so that they can be killed too."""
 
 
-class Ended(NamedTuple):
-    """How a session went."""
+class SessionResult(NamedTuple):
+    """The result of a session."""
 
     passed: bool
     failed: list[str]
-    """The tests that failed, first one first; empty when the time was up or pytest itself broke."""
+    """The tests that failed, in order; empty after a timeout or a crash of pytest itself."""
     seconds: dict[str, float]
     reach: dict[str, dict[str, list[int]]]
-    """Test, file, lines; only of a measured session."""
+    """Lines by file by test; only for a measured session."""
     output: str
 
 
 def prepare() -> None:
-    """Load the libraries that tests use; adopt orphans. To be called once, in the process that will fork."""
+    """Load the libraries that tests use, and adopt orphans. Call it once, in the process that will fork."""
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # numpy would start threads, and threads do not survive a fork
     for name in PRELOADED:
         importlib.import_module(name)
@@ -55,10 +55,10 @@ def prepare() -> None:
 
 def run_tests(
     root: Path, files: list[str], wanted: list[str] | None, limit_s: float, *, stop: bool = True, measure: str = ""
-) -> Ended:
-    """Run tests of the tree at `root` and return how it went; after `limit_s` everything of it is killed.
+) -> SessionResult:
+    """Run tests of the tree at `root` and return the result; after `limit_s` all its processes are killed.
 
-    `measure` is a comma-separated list of globs whose lines are noted for each test; `stop` ends at the first failure.
+    measure: comma-separated globs of files whose lines are recorded for each test. stop: end at the first failure.
     """
     out = root / ".session.json"
     out.unlink(missing_ok=True)
@@ -73,8 +73,8 @@ def run_tests(
     try:
         value = json.loads(out.read_text())
     except (OSError, ValueError):
-        return Ended(False, [], {}, {}, text)
-    return Ended(value["code"] == 0, value["failed"], value["seconds"], value["reach"], text)
+        return SessionResult(False, [], {}, {}, text)
+    return SessionResult(value["code"] == 0, value["failed"], value["seconds"], value["reach"], text)
 
 
 def _wait(pid: int, limit_s: float) -> None:
@@ -86,7 +86,7 @@ def _wait(pid: int, limit_s: float) -> None:
 
 
 def _kill_all(pid: int) -> None:
-    """Kill the session, and whatever of it has become ours, until nothing is left."""
+    """Kill the session and the orphans adopted from it, until none is left."""
     _kill_group(pid)
     os.waitpid(pid, 0)
     deadline = time.monotonic() + 5.0
@@ -100,7 +100,7 @@ def _kill_all(pid: int) -> None:
 
 
 def _kill_group(pid: int) -> None:
-    for kill in (os.killpg, os.kill):  # the group exists from the child's first moment on, but not before
+    for kill in (os.killpg, os.kill):  # the group may not exist yet
         try:
             kill(pid, signal.SIGKILL)
         except ProcessLookupError:
@@ -108,7 +108,7 @@ def _kill_group(pid: int) -> None:
 
 
 def _child(root: Path, files: list[str], wanted: list[str] | None, out: Path, *, stop: bool, measure: str) -> None:
-    """Become a pytest in another tree; does not return."""
+    """Run pytest in another tree; does not return."""
     code = 70
     try:
         os.setsid()
@@ -139,7 +139,7 @@ def _move_to(root: Path) -> None:
 
 
 def _pytest(files: list[str], wanted: list[str] | None, out: Path, *, stop: bool, measure: str) -> int:
-    chosen = Chosen(wanted)
+    chosen = ChosenTests(wanted)
     plugins: list[object] = [chosen]
     tracer = None
     if measure:
@@ -147,7 +147,7 @@ def _pytest(files: list[str], wanted: list[str] | None, out: Path, *, stop: bool
 
         tracer = Coverage(data_file=None, include=measure.split(","), config_file=False)
         tracer.start()
-        plugins.append(Reach(tracer))
+        plugins.append(CoverageContexts(tracer))
     options = [*OPTIONS, "-x"] if stop else OPTIONS
     code = int(pytest.main([*options, *files], plugins=plugins))
     reach: dict[str, dict[str, list[int]]] = {}

@@ -1,4 +1,4 @@
-"""What a session of mutants comes to: survivors, wrong entries of the list, figures by folder."""
+"""Summarise a session: survivors, wrong entries in the list, figures by folder."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ NOTICED = ("killed", "timeout")
 
 
 class Summary:
-    """Sorts verdicts into what is fine and what has to be said."""
+    """Sorts verdicts into expected ones and those to report."""
 
     def __init__(self, verdicts: dict[Mutant, Verdict], listed: list[Equivalent], existing: Iterable[Mutant]) -> None:
-        """`existing` are all mutants of today's code, tried or not: an entry that names none of them is stale."""
+        """existing: all mutants of today's code, tested or not; an entry that matches none of them is stale."""
         places = {entry.place for entry in listed}
         there = {mutant.place for mutant in existing}
         self.verdicts = verdicts
@@ -29,11 +29,11 @@ class Summary:
 
     @property
     def clean(self) -> bool:
-        """Return whether every mutant was noticed or is listed, and every entry of the list is true."""
+        """Return whether every mutant was killed or is listed, and every entry in the list is correct."""
         return not (self.survivors or self.stale or self.not_equivalent)
 
     def lines(self) -> list[str]:
-        """Return what is printed: survivors first, the figures last."""
+        """Return the lines to print: survivors first, the figures last."""
         text = [mutant.name for mutant in self.survivors]
         text += [f"listed, but no such mutant: {_words(entry)}" for entry in self.stale]
         text += [f"listed as equivalent, but a test kills it: {_words(entry)}" for entry in self.not_equivalent]

@@ -1,4 +1,4 @@
-"""What is mutated and which tests must notice: the one table to update when files move."""
+"""Define what is mutated and which tests must notice: the one table to update when files move."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ WHOLE = (
     "robot_io/ridgeback/rosbridge_messages.py",
     "robot_io/ur10/state.py",
 )
-"""Globs of the parts without a process: every mutant of them runs, but for the shells below that a glob also finds."""
+"""Globs of the parts without a process: every mutant of them is tested, except for the shells below."""
 
 WHOLE_TESTS = ("tests/control", "tests/safety", "tests/robot_io", "tests/tools/log", "tests/wire")
-"""Measured once, so that a mutant only meets the tests that reach it."""
+"""Measured once, so that a mutant is only run against the tests that reach it."""
 
 _RUNS = ("tests/tools/commands/test_run_emulated.py",)
 SHELLS = (
@@ -51,14 +51,14 @@ SHELLS = (
     Shell("tools/run/emulator_process.py", _RUNS),
 )
 SAMPLE = 200
-"""So many mutants of all shells together: each costs whole test files in which processes start."""
+"""This many mutants of all shells together: each needs complete test files that start processes."""
 SEED = "single-point-push"
 
 PRODUCT = ("robot_io", "control", "safety", "sim_backend", "tools")
 
 
 def whole_paths(root: Path = ROOT) -> list[str]:
-    """Return the paths of all parts that are mutated whole, relative to `root`, sorted."""
+    """Return the paths of all parts that are mutated completely, relative to `root`, sorted."""
     shells = {shell.path for shell in SHELLS}
     found = {path.relative_to(root).as_posix() for glob in WHOLE for path in root.glob(glob)}
     return sorted(found - shells)

@@ -1,4 +1,4 @@
-"""A copy of the checkout in which a file can be changed: whatever a test starts there sees the change."""
+"""Copies of the checkout in which a file can be changed: everything a test starts there sees the change."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Tree:
 
     @classmethod
     def copy(cls, root: Path) -> Tree:
-        """Copy the checkout's files as they are now, those that git ignores left out, to the new folder `root`."""
+        """Copy the checkout's files as they are now, except those git ignores, to the new folder `root`."""
         command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
         listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
         for name in filter(None, listed.split("\0")):
@@ -31,9 +31,9 @@ class Tree:
 
     @contextlib.contextmanager
     def changed(self, path: str, source: bytes) -> Iterator[None]:
-        """Give the file at `path` another content for a while.
+        """Temporarily replace the content of the file at `path`.
 
-        Its byte code goes, for Python would trust an old one of the same second and size; the tests write none.
+        Its byte code is deleted: Python would trust an old one of the same second and size. The tests write none.
         """
         file = self.root / path
         original = file.read_bytes()

@@ -8,7 +8,7 @@ import pytest
 
 from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten
 from tools.cli import main
-from tools.replay import arrived
+from tools.replay import base_inputs
 from tools.replay.fold import replay
 
 DIFFERS = 7
@@ -95,7 +95,7 @@ def test_memory_is_bounded_and_what_was_forgotten_is_no_difference(level, reques
     """With room for 50, a log as it was written has all; one sorted by topic can be compared in part only."""
     log = request.getfixturevalue(level)
     whole = replay(log).arrived
-    monkeypatch.setattr(arrived, "MOST_KEPT", 50)
+    monkeypatch.setattr(base_inputs, "MOST_KEPT", 50)
     assert replay(log).arrived == whole
 
     def by_topic(messages: Messages) -> Messages:

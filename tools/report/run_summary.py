@@ -1,4 +1,4 @@
-"""What a run came to, in words and numbers, from its log alone: verdict, figures, settings that differ."""
+"""Summarise a run from its log alone: verdict, key figures, settings that differ, timing, counters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tools.terminal.verdict import VERDICTS, lost
 
 
 class Verdict(NamedTuple):
-    """How the run ended: one line, why, and whether it is good news."""
+    """How the run ended: one line, the reason, and whether it succeeded."""
 
     line: str
     why: str
@@ -28,23 +28,23 @@ class Verdict(NamedTuple):
 
 
 def verdict(run: RunData) -> Verdict:
-    """Return the verdict of a run, as far as its log tells."""
+    """Return the verdict of a run as far as its log shows it."""
     if run.last is None:
         return Verdict(
-            "Never began", "The loop did not start: the devices were not ready, or it was stopped first.", False
+            "Did not start", "The loop did not start: the devices were not ready, or it was stopped first.", False
         )
     last = run.last
     end = outcome(last.input, last.after, last.output)
     distance, lateral = f"{end['distance_m']:.2f} m", f"{end['lateral_error_m']:+.3f} m"
     faults = [FAULTS[fault].text if fault in FAULTS else fault for fault in last.output.faults]
-    # Warnings at the end explain nothing, unless there is nothing else.
+    # Warnings do not explain the end, unless there is nothing else.
     strong = [FAULTS[fault].text for fault in last.output.faults if fault in FAULTS and FAULTS[fault].mode]
     why = "; ".join(strong or faults)
     if not last.output.finished:
         phase = str(end["phase"]).lower().replace("_", " ")
         return Verdict(
             f"Aborted after {distance}",
-            f"The log ends in mid-run (phase {phase}){': ' + why if why else ''}.",
+            f"The log ends during the run (phase {phase}){': ' + why if why else ''}.",
             False,
         )
     if last.output.exit_code == 0:
@@ -58,7 +58,7 @@ def verdict(run: RunData) -> Verdict:
 
 
 def tiles(run: RunData) -> list[tuple[str, str]]:
-    """Return the figures of the run: (what, value with unit)."""
+    """Return the key figures of the run as pairs (quantity, value with unit)."""
     if run.last is None:
         return [("log", f"{run.messages} messages"), ("length", f"{run.duration_s:.1f} s")]
     last = run.last
@@ -72,10 +72,10 @@ def tiles(run: RunData) -> list[tuple[str, str]]:
     found = [
         ("distance", f"{end['distance_m']:.3f} of {run.rig.control.distance_m:g} m"),
         ("lateral error at the end", f"{end['lateral_error_m']:+.3f} m"),
-        ("maximum deviation", _number(_furthest(ticks["lateral_m"][pushing]), "m", "+.3f")),
+        ("maximum deviation", _number(_largest_deviation(ticks["lateral_m"][pushing]), "m", "+.3f")),
         ("time pushing", f"{pushed_s:.1f} s"),
-        ("force while pushing, median", _number(float(np.median(size[pushing])) if pushing.any() else math.nan, "N")),
-        ("greatest force", _number(float(np.nanmax(raw)) if np.isfinite(raw).any() else math.nan, "N")),
+        ("median force while pushing", _number(float(np.median(size[pushing])) if pushing.any() else math.nan, "N")),
+        ("maximum force", _number(float(np.nanmax(raw)) if np.isfinite(raw).any() else math.nan, "N")),
         ("sensor after the push", _number(control.residual_N, "N from zero", ".2f")),
         ("ticks skipped", f"{run.skipped} of {run.tick_count + run.skipped}"),
     ]
@@ -83,7 +83,7 @@ def tiles(run: RunData) -> list[tuple[str, str]]:
 
 
 def baseline_of(rig: RigConfig) -> str:
-    """Return the shipped rig to compare settings with: the one of its name, else the one of its level."""
+    """Return the shipped rig to compare settings with: the one of the same name, else the one of the same level."""
     if rig.name in shipped_rigs():
         return rig.name
     levels = {rig.ft.level, rig.arm.level, rig.base.level}
@@ -91,7 +91,7 @@ def baseline_of(rig: RigConfig) -> str:
 
 
 def differences(rig: RigConfig, baseline: str) -> list[tuple[str, str, str]]:
-    """Return (setting, shipped value, this run's value) of every setting that differs."""
+    """Return (setting, shipped value, this run's value) for every setting that differs."""
     ours, theirs = _flat(msgspec.to_builtins(rig)), _flat(msgspec.to_builtins(load_rig(baseline)))
     names = dict.fromkeys((*theirs, *ours))
     return [
@@ -102,28 +102,28 @@ def differences(rig: RigConfig, baseline: str) -> list[tuple[str, str, str]]:
 
 
 def timing_rows(run: RunData) -> list[tuple[str, str]]:
-    """Return the loop's timing: (what, value)."""
+    """Return the loop's timing as pairs (quantity, value)."""
     if not run.late.total or run.first is None or run.last is None:
         return []
     late = run.late
     span_s = (run.last.input.now_ns - run.first.input.now_ns) * 1e-9
     steps = run.last.input.tick - run.first.input.tick
     rows = [
-        ("rate, wanted", f"{run.rig.loop.rate_hz:g} Hz"),
+        ("rate, configured", f"{run.rig.loop.rate_hz:g} Hz"),
         ("rate, measured", f"{steps / span_s:.3f} Hz" if span_s > 0 else "-"),
         ("ticks", str(run.tick_count)),
         ("ticks skipped", str(run.skipped)),
-        ("late, half of the ticks below", f"{late.percentile_ms(50):.2f} ms"),
-        ("late, 99 % below", f"{late.percentile_ms(99):.2f} ms"),
-        ("late, 99.9 % below", f"{late.percentile_ms(99.9):.2f} ms"),
-        ("late, worst", f"{late.worst_ms:.2f} ms"),
+        ("lateness, median", f"{late.percentile_ms(50):.2f} ms"),
+        ("lateness, 99th percentile", f"{late.percentile_ms(99):.2f} ms"),
+        ("lateness, 99.9th percentile", f"{late.percentile_ms(99.9):.2f} ms"),
+        ("lateness, maximum", f"{late.worst_ms:.2f} ms"),
     ]
     dropped = run.last.input.host.log_dropped
     return [*rows, ("records that did not fit into the log", str(dropped))]
 
 
 def counters(run: RunData, summary: dict[str, Any]) -> dict[str, list[tuple[str, str]]]:
-    """Return (counter, value) per device: the drivers' own counts if the summary has them, else the last tick's."""
+    """Return pairs (counter, value) per device: the driver's counts if the summary has them, else the last tick's."""
     sensor, arm_name, base_name = names = device_names(run.rig)
     found: dict[str, dict[str, Any]] = {name: {} for name in names}
     if run.last is not None:
@@ -131,18 +131,18 @@ def counters(run: RunData, summary: dict[str, Any]) -> dict[str, list[tuple[str,
         found[sensor] = {"packets_ok": ft.packets_ok, "crc_fail": ft.crc_fail, "junk_bytes": ft.junk_bytes}
         found[arm_name] = {"packets": arm.packets}
         found[base_name] = {"pose": base.pose_seq, "odometry": base.odometry_seq}
-    told = summary.get("devices")
+    counted = summary.get("devices")
     for device in found:
-        if isinstance(told, dict) and isinstance(told.get(device), dict):
-            found[device].update(told[device])
+        if isinstance(counted, dict) and isinstance(counted.get(device), dict):
+            found[device].update(counted[device])
     rows = {}
     for (device, values), age in zip(found.items(), run.ages.values(), strict=True):
         rows[device] = [(str(name).replace("_", " "), str(value)) for name, value in list(values.items())[:100]]
         if age.total:
             rows[device] += [
                 ("age of newest data, median", f"{age.percentile_ms(50):.1f} ms"),
-                ("age of newest data, 99 % below", f"{age.percentile_ms(99):.1f} ms"),
-                ("age of newest data, worst", f"{age.worst_ms:.1f} ms"),
+                ("age of newest data, 99th percentile", f"{age.percentile_ms(99):.1f} ms"),
+                ("age of newest data, maximum", f"{age.worst_ms:.1f} ms"),
             ]
     return rows
 
@@ -151,7 +151,7 @@ def _number(value: float, unit: str, form: str = ".1f") -> str:
     return f"{value:{form}} {unit}" if math.isfinite(value) else ""
 
 
-def _furthest(values: Floats) -> float:
+def _largest_deviation(values: Floats) -> float:
     finite = values[np.isfinite(values)]
     return float(finite[np.argmax(np.abs(finite))]) if len(finite) else math.nan
 
