@@ -113,14 +113,14 @@ def main() -> int:
     question = msgspec.json.decode(sys.stdin.buffer.read(), type=KindQuery)
     status = StatusPipe(question.status_fd)
     try:
-        told = {
+        declared = {
             device: kind_facts(device, find_kind(device, kind, question.folder), kind)
             for device, kind in question.kinds.items()
         }
     except PushError as error:
         status.error(error)
         return error.exit_code
-    status.say("ready", told=told)
+    status.say("ready", told=declared)
     return 0
 
 

@@ -50,18 +50,18 @@ def _with_kinds(rig: RigConfig, folder: str) -> tuple[RigConfig, list[str]]:
     own = {device: kind for device, kind in kinds_of(rig).items() if not is_shipped(device, kind)}
     if not own:
         return rig, []
-    told = query_kinds(own, folder)
-    if "ft" in told and told["ft"].facts is not None:
-        rig = replace(rig, ft=replace(rig.ft, declared=told["ft"].facts))
+    declared_by = query_kinds(own, folder)
+    if "ft" in declared_by and declared_by["ft"].facts is not None:
+        rig = replace(rig, ft=replace(rig.ft, declared=declared_by["ft"].facts))
     problems = [
         f"`{own[device]}` has no emulator, and {device} is at level emulated"
         for device in devices_at(rig, "emulated")
-        if device in told and not told[device].emulated
+        if device in declared_by and not declared_by[device].emulated
     ]
     problems += [
         f"`{own[device]}` cannot be simulated at level sim (an external sensor can, an external arm or base cannot)"
         for device in devices_at(rig, "sim")
-        if device in told and device != "ft"
+        if device in declared_by and device != "ft"
     ]
     return rig, problems
 

@@ -63,7 +63,7 @@ def lines(result: ReplayResult) -> Iterator[str]:
         yield f"arrived: {result.arrived.identical} of {result.arrived.messages} messages as the ticks hold them"
         differences.append(("message at ", result.arrived.first_difference))
     if result.gaps:
-        yield f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)"
+        yield f"gaps: {result.gaps} (ticks missing in the log; the state after each gap was read from the log)"
     for note in result.notes:
         yield f"note: {note}"
     if result.made_by.note and not result.different:

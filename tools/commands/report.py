@@ -51,9 +51,9 @@ def write_page(log: Path, args: argparse.Namespace) -> list[Path]:
         page = out / "report.html"
         figures = [out / f"{name}.png" for name in PNG_NAMES] if args.png else []
         # A picture beside a report belongs to it and may be overwritten with it; any other is kept.
-        taken = [figure for figure in figures if figure.exists() and not page.exists()]
-        if taken:
-            raise UsageError("there is already a file of this name", where=str(taken[0]), do="Give another --out")
+        existing = [figure for figure in figures if figure.exists() and not page.exists()]
+        if existing:
+            raise UsageError("there is already a file of this name", where=str(existing[0]), do="Give another --out")
         pngs = write_report(log, page)
         for figure in figures:
             figure.write_bytes(pngs[figure.stem])

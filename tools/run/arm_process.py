@@ -59,7 +59,7 @@ def main() -> int:
             newest = publish(driver, record, newest, servo=arm.hold == "servo")
             if newest.link == LinkState.LOST:
                 lost = DeviceUnreachable(
-                    driver.health().cause or "its link is gone", where=arm.host, do="Look at the arm"
+                    driver.health().cause or "its link is lost", where=arm.host, do="Check the arm"
                 )
                 status.error(lost)
                 return lost.exit_code

@@ -233,10 +233,10 @@ class Launcher:
                 self.notes.append(f"{name}: {child.errors[-1].what}")
             elif child is not None and child.process.returncode != 0:
                 self.notes.append(f"the {name} process {child.how_it_ended()}")
-        said = self._finished_event("recorder")
-        if not said.get("complete", False):
+        recorded = self._finished_event("recorder")
+        if not recorded.get("complete", False):
             self.notes.append("the log is not complete: `push log recover` may repair it")
-        if dropped := sum(said.get("dropped", {}).values()):
+        if dropped := sum(recorded.get("dropped", {}).values()):
             self.notes.append(f"{dropped} records did not fit into the log's ring buffers")
 
     def _figures(self) -> dict[str, Any]:
