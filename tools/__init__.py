@@ -1,1 +1,1 @@
-"""The `push` program: composes drivers, loop, gate, recorder and emulators; start at `tools.run.launcher`."""
+"""The `push` program: combines drivers, loop, gate, recorder and emulators; start reading at `tools.run.launcher`."""

@@ -1,8 +1,9 @@
-"""Makes the one `.venv` of this checkout: `python3 tools/bootstrap.py runtime|dev`, called by every make target.
+"""Create the `.venv` of this checkout: `python3 tools/bootstrap.py runtime|dev`, called by every make target.
 
-It uses only the standard library, and nothing newer than Python 3.7, so that an old Python gets a sentence and
-not a syntax error. It works where the system's pip is externally managed, and with only python3-venv or
-only python3-pip present. A stamp in `.venv` names what was installed from which files: nothing is done twice.
+It uses only the standard library, and no syntax newer than Python 3.7, so that an old Python prints an
+explanation instead of a syntax error. It works where the system's pip is externally managed, and with only
+python3-venv or only python3-pip present. A stamp in `.venv` records what was installed from which files, so that
+nothing is done twice.
 """
 
 from __future__ import annotations
@@ -19,25 +20,25 @@ ROOT = Path(__file__).resolve().parent.parent
 EXTRAS = {"runtime": "[app]", "dev": "[dev,sweep,cluster]"}
 OLDEST = (3, 11)
 WHEELS_BELOW = (3, 13)
-"""ur_rtde comes ready-built for Pythons below this one; for newer ones it is compiled."""
+"""ur_rtde has wheels for Python versions below this one; for newer ones it is compiled."""
 APT_VENV = "sudo apt install python3-venv"
 NO_WHEEL = (
-    "ur_rtde is ready-built for Python 3.11 and 3.12: `make PYTHON=python3.12 demo`; "
+    "ur_rtde has wheels for Python 3.11 and 3.12: `make PYTHON=python3.12 demo`; "
     "to compile it instead: `sudo apt install git cmake g++ libboost-all-dev python3-dev`"
 )
 
 
 UNFINISHED = ".unfinished"
-"""In an environment that is being made or filled; one that still has it was left half-made by a kill, and is made anew:
-what is half there looks installed."""
+"""Marks an environment that is being created or filled. One that still has it was interrupted and is recreated: a
+partly installed package looks installed."""
 
 
 class SetUpError(Exception):
-    """Set-up cannot go on; the text is the one sentence that helps."""
+    """Set-up cannot continue; the text says what to do."""
 
 
 def run(*command: str, quiet: bool = True) -> bool:
-    """Run `command`; return whether it succeeded. `quiet` is for commands that are expected to fail somewhere."""
+    """Run `command`; return whether it succeeded. `quiet` is for commands that may fail on some machines."""
     sink = subprocess.DEVNULL if quiet else None
     try:
         done = subprocess.run(command, stdout=sink, stderr=sink, stdin=subprocess.DEVNULL, check=False)
@@ -47,7 +48,7 @@ def run(*command: str, quiet: bool = True) -> bool:
 
 
 def digest_of_inputs() -> str:
-    """Return a digest of the two files that say what to install."""
+    """Return a digest of the two files that define what to install."""
     digest = hashlib.sha256()
     for name in ("pyproject.toml", "constraints.txt"):
         digest.update((ROOT / name).read_bytes())
@@ -55,9 +56,9 @@ def digest_of_inputs() -> str:
 
 
 def choose_python() -> str:
-    """Return the interpreter to use: this one, or an older one beside it when this one is too new for the wheels.
+    """Return the interpreter to use: this one, or an installed older one if this one is too new for the wheels.
 
-    Of an active environment, the one it was made from: `.venv` cannot be made from itself.
+    In an active environment, the one it was created from: `.venv` cannot be created from itself.
     """
     if sys.version_info[:2] < OLDEST:
         this = ".".join(map(str, sys.version_info[:2]))
@@ -74,38 +75,38 @@ def choose_python() -> str:
 
 
 def make_folder(venv: Path) -> None:
-    """Make `venv` a new folder, marked as unfinished."""
+    """Create the folder `venv`, replacing any existing one, and mark it as unfinished."""
     shutil.rmtree(venv, ignore_errors=True)
     venv.mkdir()
     (venv / UNFINISHED).touch()
 
 
 def make_venv(python: str, venv: Path) -> list[str]:
-    """Make `venv` and return the command that installs with pip into it."""
+    """Create `venv` and return the pip command that installs into it. Raises SetUpError."""
     inside = [str(venv / "bin" / "python"), "-m", "pip"]
     if (venv / "bin" / "uv").exists() or run(*inside, "--version"):
-        return inside  # it is there already
+        return inside  # it exists already
     make_folder(venv)
     if run(python, "-m", "venv", str(venv)) and run(*inside, "--version"):
         return inside
-    # Without python3-venv there is no pip to put in, but a system pip can install into another environment.
+    # Without python3-venv the environment has no pip, but a system pip can install into another environment.
     make_folder(venv)
     outside = [python, "-m", "pip", "--python", str(venv / "bin" / "python")]
     if run(python, "-m", "venv", "--without-pip", str(venv)) and run(*outside, "--version"):
         return outside
     shutil.rmtree(venv, ignore_errors=True)
-    raise SetUpError(f"this Python cannot make an environment with pip: run `{APT_VENV}`, then try again")
+    raise SetUpError(f"this Python cannot create an environment with pip: run `{APT_VENV}`, then try again")
 
 
 def install(kind: str, pip: list[str], venv: Path) -> None:
-    """Install the program with the pinned versions, with uv if it can be had, else with pip."""
+    """Install the program with the pinned versions, with uv if it is available, else with pip. Raises SetUpError."""
     uv = str(venv / "bin" / "uv")
     wanted = ["-c", str(ROOT / "constraints.txt"), "-e", f"{ROOT}{EXTRAS[kind]}"]
     if Path(uv).exists() or run(*pip, "install", "-q", "--disable-pip-version-check", "uv"):
-        # Compiled at once, as pip does: matplotlib and numpy would otherwise be compiled by the first runs, or,
-        # where PYTHONDONTWRITEBYTECODE is set, by every process of every run.
+        # Byte-compiled at once, as pip does: otherwise the first runs would compile matplotlib and numpy, or, where
+        # PYTHONDONTWRITEBYTECODE is set, every process of every run.
         into = ["--compile-bytecode", "--python", str(venv / "bin" / "python")]
-        if not run(uv, "pip", "list", *into[1:]):  # nowhere to keep what it fetches, as in a home that is read-only
+        if not run(uv, "pip", "list", *into[1:]):  # no place for its cache, as in a read-only home
             into.append("--no-cache")
         done = run(uv, "pip", "install", "-q", *into, *wanted, quiet=False)
     else:
@@ -116,24 +117,24 @@ def install(kind: str, pip: list[str], venv: Path) -> None:
 
 
 def set_up(kind: str, venv: Path) -> None:
-    """Bring `venv` to hold what `kind` (runtime or dev) needs; at once when its stamp says it does."""
+    """Install what `kind` (runtime or dev) needs into `venv`; return at once if its stamp says it is there."""
     python = choose_python()
     digest = digest_of_inputs()
     home = f"{python} in {ROOT}"
     stamp = venv / ".installed"
     written = stamp.read_text(encoding="utf-8").splitlines() if stamp.is_file() else []
     installed, for_digest, at_home = (*written, "", "", "")[:3]
-    # dev holds all of runtime
+    # dev includes all of runtime
     if at_home == home and for_digest == digest and installed in ("dev", kind) and not (venv / UNFINISHED).exists():
         return
     print(f"setting up {venv.name} ({kind}) with {python}: about half a minute the first time", flush=True)
-    # Another Python, or the folder was moved: its scripts would not start. Or half-made.
+    # Another Python or a moved folder, whose scripts would not start; or an interrupted set-up.
     if at_home not in ("", home) or (venv / UNFINISHED).exists():
         make_folder(venv)
     pip = make_venv(python, venv)
     (venv / UNFINISHED).touch()
     stamp.unlink(missing_ok=True)
-    # What `make test` once installed stays installed when `make demo` follows a change.
+    # What `make test` installed stays installed if `make demo` follows a change.
     kind = "dev" if installed == "dev" else kind
     install(kind, pip, venv)
     stamp.write_text(f"{kind}\n{digest}\n{home}\n", encoding="utf-8")
@@ -141,8 +142,8 @@ def set_up(kind: str, venv: Path) -> None:
 
 
 def main() -> int:
-    """Set up for `runtime` or `dev`; return 0, or 2 with a sentence."""
-    os.environ.pop("VIRTUAL_ENV", None)  # an active environment of the caller's is not ours to fill
+    """Set up for `runtime` or `dev`; return 0, or 2 after printing what is wrong."""
+    os.environ.pop("VIRTUAL_ENV", None)  # nothing is installed into the caller's active environment
     # One set-up at a time: two make calls in two terminals wait for each other.
     with (ROOT / "pyproject.toml").open("rb") as guard:
         fcntl.flock(guard, fcntl.LOCK_EX)
@@ -151,11 +152,11 @@ def main() -> int:
         except SetUpError as error:
             print(f"set-up: {error}", file=sys.stderr)
             return 2
-        except OSError as error:  # a checkout of somebody else's, a full disk
+        except OSError as error:  # another user's checkout, a full disk
             print(f"set-up: {error.filename or ROOT} cannot be written: {error.strerror}", file=sys.stderr)
             return 2
         except KeyboardInterrupt:
-            print("set-up: stopped; the next make goes on", file=sys.stderr)
+            print("set-up: stopped; the next make continues", file=sys.stderr)
             return 130
     return 0
 

@@ -1,7 +1,7 @@
-"""The `push` program: finds the command's module, imports only that one, and turns every error into one sentence.
+"""The `push` program: finds the command's module, imports only that one, and reports every error in one sentence.
 
 A command module has `add_arguments(parser)` and `run(args) -> int`. Commands of two words (`bench physics`) are
-entries with a space. `--json` promises exactly one object, on one line, last on stdout, errors included.
+keys with a space. `--json` promises exactly one object, on one line, last on stdout, errors included.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from robot_io.error_report import discard_stdout, ignoring_output_errors, report
 from robot_io.errors import EnvironmentFault, OperatorStop, PushError, UsageError
 
 BROKEN_PIPE = 141
-"""128 + SIGPIPE: whoever read our output has gone (`push log cat LOG | head`)."""
+"""128 + SIGPIPE: the reader of our output has closed it (`push log cat LOG | head`)."""
 
 
 class Command(NamedTuple):
-    """Where a command lives, what it does in a few words, and two examples of it."""
+    """A command's module, a short summary and two examples."""
 
     module: str
     summary: str
@@ -57,7 +57,9 @@ COMMANDS = {
         "many simulated pushes, and the paper's figures",
         ("push sweep --out sweeps/paper", "push sweep my-grid.toml --out sweeps/mine --resume"),
     ),
-    "tune": Command("tools.commands.tune", "map of the gains over simulated pushes", ("push tune", "push tune --json")),
+    "tune": Command(
+        "tools.commands.tune", "recommend gains, with a map of the stable ones", ("push tune", "push tune --json")
+    ),
     "emulate": Command(
         "tools.commands.emulate",
         "the wire emulators on their own, until stopped",
@@ -82,15 +84,15 @@ COMMANDS = {
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse that raises instead of exiting, so that `--json` holds for usage errors too."""
+    """An argparse parser that raises instead of exiting, so that `--json` also covers usage errors."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise UsageError with argparse's own words."""
-        raise UsageError(message, where="command line", do=f"`{self.prog} --help` shows how")
+        """Raise UsageError with argparse's message."""
+        raise UsageError(message, where="command line", do=f"`{self.prog} --help` shows the usage")
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run one command and return its exit code; never raises but for SystemExit of `--help`."""
+    """Run one command and return its exit code; never raises except SystemExit for `--help`."""
     keep_standard_descriptors()
     as_json = "--json" in argv
     try:
@@ -106,9 +108,9 @@ def main(argv: Sequence[str]) -> int:
             discard_stdout()
             return BROKEN_PIPE
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:
-            where = str(error.filename or "")  # none: where the output goes
+            where = str(error.filename or "")  # empty: the disk that stdout goes to
             with ignoring_output_errors():
-                return report(EnvironmentFault("there is no room left on the disk", where=where), as_json=as_json)
+                return report(EnvironmentFault("there is no space left on the disk", where=where), as_json=as_json)
         return report(unexpected(error), as_json=as_json)
     return code
 
@@ -138,7 +140,7 @@ def parser_of(name: str, module: ModuleType) -> Parser:
 
 
 def _overview(argv: Sequence[str]) -> int:
-    """Answer `push`, `push --help`, `push --version`, a first word of two, and words that are no command."""
+    """Handle `push`, `push --help`, `push --version`, the first word of a two-word command, and unknown commands."""
     first = argv[0] if argv else "--help"
     group = {name: command for name, command in COMMANDS.items() if name.startswith(f"{first} ")}
     if first == "--version":
@@ -168,8 +170,8 @@ def _overview(argv: Sequence[str]) -> int:
 def keep_standard_descriptors() -> None:
     """Open /dev/null for each of the descriptors 0, 1, 2 that is closed.
 
-    Otherwise the next device opened would get the number, and a library that writes to descriptor 2
-    (ur_rtde does) would write into the device.
+    Otherwise the next device opened would get that number, and a library that writes to descriptor 2
+    (ur_rtde does) would write to the device.
     """
     for fd in (0, 1, 2):
         try:

@@ -1,6 +1,6 @@
-"""Asks a driver of somebody else what it declares, in a process of its own: `python -m tools.kinds` (job on stdin).
+"""Read what external drivers declare, in a separate process: `python -m tools.kinds` (job on stdin).
 
-Its code runs here only, and in the processes that build its devices; never in this program's other processes.
+Their code runs only here and in the processes that build their devices, never in this program's other processes.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from robot_io.rig.config import RigConfig
 ANSWER_WITHIN_S = 20.0
 
 
-class Told(msgspec.Struct, frozen=True):
-    """What a class says of itself."""
+class KindFacts(msgspec.Struct, frozen=True):
+    """What a driver class declares."""
 
     emulated: bool
-    """It names an emulator."""
+    """Whether it has an emulator."""
     facts: SensorFacts | None = None
-    """What a sensor declares."""
+    """Facts of a sensor."""
 
 
-class Question(msgspec.Struct, frozen=True):
-    """The kinds to look at, by device, and where else their modules may be."""
+class KindQuery(msgspec.Struct, frozen=True):
+    """The kinds to query, by device, and another place to look for their modules."""
 
     kinds: dict[str, str]
     folder: str
@@ -43,42 +43,44 @@ SHORT_NAMES = {"robotiq-ft300": "ft300", "ur": "ur10", "ridgeback-rosbridge": "r
 
 
 def name_of(kind: str) -> str:
-    """Return what a device of this kind is called in messages and summaries."""
+    """Return the name of a device of this kind in messages and summaries."""
     return SHORT_NAMES.get(kind, kind)
 
 
 def device_names(rig: RigConfig) -> tuple[str, str, str]:
-    """Return what the sensor, the arm and the base of a rig are called."""
+    """Return the names of a rig's sensor, arm and base."""
     return name_of(rig.ft.kind), name_of(rig.arm.kind), name_of(rig.base.kind)
 
 
 def is_shipped(device: str, kind: str) -> bool:
-    """Return whether a kind is one of this program's."""
+    """Return whether a kind is part of this program."""
     return kind in SHIPPED[device]
 
 
-def ask(kinds: dict[str, str], folder: str) -> dict[str, Told]:
-    """Return what each kind (by device: ft, arm, base) says of itself.
+def query_kinds(kinds: dict[str, str], folder: str) -> dict[str, KindFacts]:
+    """Return what each kind (by device: ft, arm, base) declares.
 
-    Raises ConfigError: it cannot be found or imported, lacks a part, declares what is no `SensorFacts`, takes too long.
+    Raises ConfigError if a kind cannot be found or imported, lacks a part, declares facts that are not `SensorFacts`,
+    or takes too long.
     """
-    child = spawn("kinds", "tools.kinds", Question(kinds, folder), [])
+    child = spawn("kinds", "tools.kinds", KindQuery(kinds, folder), [])
     try:
         try:
             child.process.wait(ANSWER_WITHIN_S)
         except subprocess.TimeoutExpired:
             raise ConfigError(
                 f"importing {_names(kinds)} took longer than {ANSWER_WITHIN_S:g} s",
-                do="Open no device while the module is imported",
+                do="Open no device during import",
             ) from None
         child.hear()
         if child.errors:
             raise child.errors[0]
         if child.ready is None:
             raise ConfigError(
-                f"importing {_names(kinds)} {child.how_it_ended()}", do="Import it in a Python of its own"
+                f"importing {_names(kinds)} {child.how_it_ended()}",
+                do="Import it in a separate Python process",
             )
-        return msgspec.convert(child.ready["told"], dict[str, Told])
+        return msgspec.convert(child.ready["told"], dict[str, KindFacts])
     finally:
         child.end(0.0)
         child.close()
@@ -88,11 +90,11 @@ def _names(kinds: dict[str, str]) -> str:
     return ", ".join(f"`{kind}`" for kind in kinds.values())
 
 
-def told_by(device: str, found: type[Any], kind: str) -> Told:
-    """Return what a class says of itself. Raises ConfigError for facts that are none."""
+def kind_facts(device: str, found: type[Any], kind: str) -> KindFacts:
+    """Return what a class declares. Raises ConfigError for invalid facts."""
     emulated = hasattr(found, "Emulator")
     if device != "ft":
-        return Told(emulated)
+        return KindFacts(emulated)
     try:
         facts = msgspec.convert(msgspec.to_builtins(found.facts), SensorFacts)
     except (msgspec.ValidationError, TypeError, ValueError) as error:
@@ -103,22 +105,22 @@ def told_by(device: str, found: type[Any], kind: str) -> Told:
         ) from None
     if not all(map(math.isfinite, (*facts.range, facts.rate_hz, *facts.resolution, *facts.noise))):
         raise ConfigError(f"the `facts` of `{kind}` hold a number that is not finite", where=f"{device}.kind")
-    return Told(emulated, facts)
+    return KindFacts(emulated, facts)
 
 
 def main() -> int:
-    """Answer one question on the status pipe."""
-    question = msgspec.json.decode(sys.stdin.buffer.read(), type=Question)
+    """Answer one query on the status pipe; return the exit code."""
+    question = msgspec.json.decode(sys.stdin.buffer.read(), type=KindQuery)
     status = StatusPipe(question.status_fd)
     try:
-        told = {
-            device: told_by(device, find_kind(device, kind, question.folder), kind)
+        declared = {
+            device: kind_facts(device, find_kind(device, kind, question.folder), kind)
             for device, kind in question.kinds.items()
         }
     except PushError as error:
         status.error(error)
         return error.exit_code
-    status.say("ready", told=told)
+    status.say("ready", told=declared)
     return 0
 
 

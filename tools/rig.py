@@ -1,4 +1,4 @@
-"""A rig that can be run: loaded, inside the program's ceilings and consistent in itself."""
+"""Load a rig that can be run: within the program's safety limits and consistent."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from robot_io.errors import ConfigError
 from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
 from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.types import Matrix3
-from tools.kinds import ask, is_shipped
+from tools.kinds import is_shipped, query_kinds
 
 ROTATION_TOLERANCE = 1e-6
 
 
 def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
-    """Load a rig with its overrides, ask its kinds what they declare, and check all that its types cannot say.
+    """Load a rig with its overrides, add what its kinds declare, and check what its types cannot express.
 
     Raises ConfigError (and UsageError for an override that is not `key=value`).
     """
@@ -34,7 +34,7 @@ def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigC
 
 
 def folder_of(name_or_path: str | Path) -> str:
-    """Return where modules of a rig's own kinds may be: its file's folder, the current one for a shipped rig."""
+    """Return the folder for modules of a rig's external kinds: its file's folder; for a shipped rig the current one."""
     shipped = str(name_or_path) in shipped_rigs()
     return str(Path.cwd() if shipped else Path(name_or_path).resolve().parent)
 
@@ -45,23 +45,23 @@ def kinds_of(rig: RigConfig) -> dict[str, str]:
 
 
 def _with_kinds(rig: RigConfig, folder: str) -> tuple[RigConfig, list[str]]:
-    """Return the rig with what its sensor declares in it, and why a kind cannot be used at its level."""
+    """Return the rig with its sensor's facts filled in, and the reasons why a kind cannot be used at its level."""
     rig = replace(rig, ft=replace(rig.ft, declared=FT300_FACTS))
     own = {device: kind for device, kind in kinds_of(rig).items() if not is_shipped(device, kind)}
     if not own:
         return rig, []
-    told = ask(own, folder)
-    if "ft" in told and told["ft"].facts is not None:
-        rig = replace(rig, ft=replace(rig.ft, declared=told["ft"].facts))
+    declared_by = query_kinds(own, folder)
+    if "ft" in declared_by and declared_by["ft"].facts is not None:
+        rig = replace(rig, ft=replace(rig.ft, declared=declared_by["ft"].facts))
     problems = [
-        f"`{own[device]}` names no emulator, and {device} is at level emulated"
+        f"`{own[device]}` has no emulator, and {device} is at level emulated"
         for device in devices_at(rig, "emulated")
-        if device in told and not told[device].emulated
+        if device in declared_by and not declared_by[device].emulated
     ]
     problems += [
-        f"`{own[device]}` cannot be simulated at level sim (a foreign sensor can, a foreign arm or base cannot)"
+        f"`{own[device]}` cannot be simulated at level sim (an external sensor can, an external arm or base cannot)"
         for device in devices_at(rig, "sim")
-        if device in told and device != "ft"
+        if device in declared_by and device != "ft"
     ]
     return rig, problems
 
@@ -92,14 +92,14 @@ def _level_problems(rig: RigConfig) -> list[str]:
         return []
     others = [device for device in ("ft", "arm", "base") if device not in simulated]
     return [
-        f"level `sim` is all three devices or none, and here {' and '.join(simulated)} would be sim beside "
-        f"{' and '.join(others)} (level `emulated` mixes with hardware)"
+        f"level `sim` is for all three devices or none; here {' and '.join(simulated)} would be sim and "
+        f"{' and '.join(others)} not (level `emulated` can be mixed with hardware)"
     ]
 
 
 def _address_problems(rig: RigConfig) -> list[str]:
     addresses = {"ft.port": rig.ft.port, "arm.host": rig.arm.host, "base.url": rig.base.url}
-    # What a driver of somebody else needs as its address, only that driver knows.
+    # Only an external driver itself knows what it needs as its address.
     shipped = [device for device in devices_at(rig, "hardware") if is_shipped(device, kinds_of(rig)[device])]
     problems = [
         f"`{key}` is missing, and {key.split('.')[0]} is at level hardware"

@@ -208,7 +208,7 @@ def test_output_to_a_full_disk_is_one_sentence(words):
             [*PUSH, *words], cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, timeout=30, check=False
         )
     assert done.returncode == 3
-    assert done.stderr.splitlines()[-1] == "push: there is no room left on the disk"
+    assert done.stderr.splitlines()[-1] == "push: there is no space left on the disk"
     assert "Traceback" not in done.stderr
 
 

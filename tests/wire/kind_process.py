@@ -43,11 +43,11 @@ def serve(device: str, kind: str, folder: str) -> None:
     from robot_io.kinds import find_kind
     from robot_io.rig.config import load_rig
     from sim_backend.world.world import World
-    from tools.run.emulators import OwnEmulator
+    from tools.run.emulators import ExternalEmulator
 
     loop = EventLoop()
     world = World(load_rig("emulated"), 0, monotonic_ns())
-    print(OwnEmulator(loop, find_kind(device, kind, folder).Emulator(world, {})).address, flush=True)
+    print(ExternalEmulator(loop, find_kind(device, kind, folder).Emulator(world, {})).address, flush=True)
     loop.add_fd(sys.stdin.fileno(), lambda _: loop.stop())  # the parent is gone
     loop.run()
 

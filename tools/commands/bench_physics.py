@@ -1,7 +1,7 @@
-"""`push bench physics`: how fast the slider's solvers are, each against the same arithmetic in C, in one run.
+"""`push bench physics`: how fast the slider's solvers are, and the batch solver against the same arithmetic in C.
 
-All figures are for this machine and this moment; the ratios are what can be compared. Figures of one core are processor
-time, so that a busy machine does not spoil them much; the whole study is wall time.
+The figures hold for this machine at this moment; only the ratios can be compared. Figures for one core are processor
+time, which a busy machine affects little; the complete study is wall time.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 C_SOURCE = Path(__file__).with_name("lanes_bench.c")
 C_FLAGS = ("-O3", "-march=native", "-ffast-math", "-fPIC", "-c")
 ROUNDS = 20
-"""Batch and C take turns so many times; the best time of each counts."""
+"""Batch and C take turns this many times; the best time of each counts."""
 BATCH_STEPS = 1000
 PYTHON_STEPS = 4000
 OSQP_STEPS = 1500
@@ -56,8 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and tell; return the exit code. Raises EnvironmentFault without numba."""
-    import sim_backend.physics.batch  # noqa: F401 - says what is missing before anything is measured
+    """Measure and print the figures; return the exit code. Raises EnvironmentFault without numba."""
+    import sim_backend.physics.batch  # noqa: F401 - fails before anything is measured if numba is missing
 
     study = paper_study({})
     lanes = [lane_of(case) for case in study.cases]
@@ -88,7 +88,7 @@ def build_c(folder: Path) -> tuple[Run | None, str | None]:
     if compiler is None:
         return None, "no C compiler (gcc, cc, clang) on the path"
     code, library = folder / "lanes_bench.o", folder / "lanes_bench.so"
-    # linked without -ffast-math: with it, loading the library would make this whole process flush tiny numbers to 0
+    # linked without -ffast-math: with it, loading the library would make this process flush denormals to 0
     for command in ([*C_FLAGS, str(C_SOURCE), "-o", str(code)], ["-shared", str(code), "-o", str(library), "-lm"]):
         done = subprocess.run(
             [compiler, *command], capture_output=True, text=True, timeout=COMPILE_TIMEOUT_S, check=False
@@ -110,7 +110,7 @@ def build_c(folder: Path) -> tuple[Run | None, str | None]:
 
 
 def _kernels(lanes: list[Lane], c_run: Run | None) -> dict[str, Any]:
-    """Time the batch and its C twin in turns on the study's lanes; check that they agree."""
+    """Time the batch and its C twin in turns on the study's lanes; return the times and their largest difference."""
     import numpy as np
 
     from sim_backend.physics.batch import STATISTICS, parameters, run_arrays
@@ -139,7 +139,7 @@ def _kernels(lanes: list[Lane], c_run: Run | None) -> dict[str, Any]:
 
 
 def _python_ns(lanes: list[Lane], solve: Any, steps: int) -> float:
-    """Time plain lanes of the study, one of each shape, with a solver."""
+    """Return the time per step of a solver in plain Python, on one lane of each shape."""
     chosen = [lanes[121], lanes[364]]
     timing = Timing(steps=steps // len(chosen))
     simulate_lane(chosen[0], Timing(steps=50), solve)
@@ -158,7 +158,7 @@ def _closed_form_ns() -> float:
 
 
 def _study_seconds() -> dict[str, Any]:
-    """Time the whole study on all cores with warm workers, without imports, figures and files."""
+    """Time the complete study on all cores with warm workers, without imports, figures and files."""
     study, workers = paper_study({}), default_workers()
     items = list(enumerate(cut(study)))
     best = float("inf")

@@ -1,6 +1,6 @@
-"""`push bench sim`: how much faster than real time level `sim` is as a whole process, and where a tick's time goes.
+"""`push bench sim`: how much faster than real time level `sim` runs as a process, and where a tick's time goes.
 
-All figures are for this machine and this moment; the ratios within one run are what can be compared.
+The figures hold for this machine at this moment; only the ratios within one run can be compared.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from tools.run.lockstep import Lockstep, open_log
 from tools.run.tick_core import TickCore
 
 ROUNDS = 5
-"""The best of so many rounds counts."""
+"""The best of this many rounds counts."""
 PARTS_DISTANCE_M = 1.0
 PROCESS_TIMEOUT_S = 600.0
 PUSH = "import sys; from robot_io._entry import main; sys.exit(main())"
@@ -42,13 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and tell; return the exit code."""
+    """Measure and print the figures; return the exit code. Raises UsageError, EnvironmentFault."""
     if not 0.1 <= args.distance_m <= 100.0:
         raise UsageError(
             f"--distance-m {args.distance_m} is out of range", where="push bench sim", do="Give 0.1 to 100"
         )
     with tempfile.TemporaryDirectory(prefix="push-bench-") as folder:
-        figures = whole_process(Path(folder), args.distance_m) | parts(Path(folder))
+        figures = time_process(Path(folder), args.distance_m) | time_tick_parts(Path(folder))
     figures = {key: float(f"{value:.4g}") for key, value in figures.items()}
     for key, value in figures.items():
         tell(f"{key:28s} {value:g}")
@@ -57,9 +57,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def whole_process(folder: Path, distance_m: float) -> dict[str, float]:
-    """Time `push run sim --fast` with its start and its log, without a report: user and system time."""
-    environment = os.environ | {"XDG_STATE_HOME": str(folder)}  # the saved tare of the user stays as it is
+def time_process(folder: Path, distance_m: float) -> dict[str, float]:
+    """Time `push run sim --fast` including its start and its log, without a report: processor and wall time in s."""
+    environment = os.environ | {"XDG_STATE_HOME": str(folder)}  # the user's saved tare is not changed
     best_cpu_s = best_wall_s = float("inf")
     for n in range(ROUNDS):
         out = folder / f"run{n}"
@@ -85,8 +85,8 @@ def whole_process(folder: Path, distance_m: float) -> dict[str, float]:
     }
 
 
-class Kept:
-    """Keeps the records of a lockstep run, to be written again."""
+class RecordedRun:
+    """The records of a lockstep run in memory, to be written again."""
 
     def __init__(self) -> None:
         self.records: list[tuple[int, int, bytes]] = []
@@ -102,17 +102,17 @@ class Kept:
         self.ticks.append((time_ns, payload, tick))
 
 
-def parts(folder: Path) -> dict[str, float]:
+def time_tick_parts(folder: Path) -> dict[str, float]:
     """Time the parts of a tick over the same recorded push, in ns per tick."""
     rig = resolve_rig("sim", [f"control.distance_m={PARTS_DISTANCE_M!r}"])
     text = rig_to_toml(rig)
     core = TickCore.of(rig)
-    kept = Kept()
+    kept = RecordedRun()
     Lockstep(rig, 0, kept).run(lambda *_: None)
     ticks = [tick for _, _, tick in kept.ticks]
 
     def simulate() -> None:
-        Lockstep(rig, 0, Kept()).run(lambda *_: None)
+        Lockstep(rig, 0, RecordedRun()).run(lambda *_: None)
 
     def fold() -> None:
         for tick in ticks:
@@ -142,7 +142,7 @@ def parts(folder: Path) -> dict[str, float]:
         figures[f"{name}_ns_per_tick"] = _best_ns(part) / len(ticks)
     # What remains without deriving: checksums, indexes, compression, the file.
     figures["write_ns_per_tick"] = _best_ns(derive_and_write) / len(ticks) - figures["derive_ns_per_tick"]
-    # The whole tick but its log: devices, world, gate, fold and the encoding of every record.
+    # The complete tick without its log: devices, world, gate, fold and the encoding of every record.
     figures["simulate_ns_per_tick"] = _best_ns(simulate) / len(ticks)
     return figures
 

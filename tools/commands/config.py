@@ -1,4 +1,4 @@
-"""`push config show|check`: the rig with every value resolved, or only whether it can be used."""
+"""`push config show|check`: print a rig with every value resolved, or only check whether it is valid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tools.rig import resolve_rig
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags."""
     parser.add_argument(
-        "action", choices=("show", "check"), help="show: print every value; check: only say whether it is valid"
+        "action", choices=("show", "check"), help="show: print every value; check: only report whether it is valid"
     )
     parser.add_argument("rig", nargs="?", default="emulated", help=f"{', '.join(shipped_rigs())}, or a path (emulated)")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one value, repeatable")
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Resolve the rig; a bad one raises ConfigError, exit code 2."""
+    """Resolve the rig; return 0. Raises ConfigError (exit code 2) for an invalid one."""
     rig = resolve_rig(args.rig, args.set)
     if args.json:
         shown = {"rig": msgspec.to_builtins(rig)} if args.action == "show" else {"name": rig.name, "good": True}

@@ -1,7 +1,7 @@
-"""`push emulate ft300|ur10|ridgeback|all`: the wire emulators alone, for any client, until SIGTERM or Ctrl-C.
+"""`push emulate ft300|ur10|ridgeback|all`: run the wire emulators for any client, until SIGTERM or Ctrl-C.
 
-Alone, a device is fed by a constant source; `all` puts the three on one simulated world. Everything listens
-on loopback only. One line per endpoint says where, as soon as clients are accepted there.
+A single device is fed by a constant source; `all` runs the three on one simulated world. Everything listens on
+loopback only. One line per endpoint is printed as soon as it accepts clients.
 """
 
 from __future__ import annotations
@@ -43,8 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ft.add_argument("--wrench", default="0,0,0,0,0,0", metavar=wrench, help="N, N*m; as in --wrench=-10,0,0,0,0,0")
     ft.add_argument("--step-after-s", type=float, metavar="S", help="change to --step-wrench this long after the start")
     ft.add_argument("--step-wrench", metavar=wrench, help="as in --step-wrench=-20,0,0,0,0,0")
-    ft.add_argument("--streaming", action="store_true", help="found streaming, as after a client that crashed")
-    ft.add_argument("--latency-ms", type=int, choices=(0, 1, 16), default=1, help="latency timer of the adapter (1)")
+    ft.add_argument("--streaming", action="store_true", help="already streaming, as after a client that crashed")
+    ft.add_argument(
+        "--latency-ms", type=int, choices=(0, 1, 16), default=1, help="latency timer of the USB adapter (1)"
+    )
     ft.set_defaults(open_devices=_open_ft300)
 
     ur = devices.add_parser(
@@ -55,10 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server", allow_abbrev=False)
     base.add_argument("--host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
-    base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 takes a free one ({BASE_PORT})")
+    base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")
     base.set_defaults(open_devices=_open_ridgeback)
 
-    everything = devices.add_parser("all", help="the three on one simulated world", allow_abbrev=False)
+    everything = devices.add_parser("all", help="all three on one simulated world", allow_abbrev=False)
     everything.add_argument(
         "rig", nargs="?", default="emulated", help="whose world: a shipped name or a path (emulated)"
     )
@@ -68,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     everything.add_argument("--seed", type=int, default=0, help="varies the start and the noise (0)")
     everything.add_argument("--arm-host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST})")
     everything.add_argument("--base-host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
-    everything.add_argument("--base-port", type=_port, default=BASE_PORT, help=f"0 takes a free one ({BASE_PORT})")
+    everything.add_argument("--base-port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")
     everything.set_defaults(open_devices=_open_all)
 
     for device in (ft, ur, base, everything):
@@ -95,11 +97,11 @@ def run(args: argparse.Namespace) -> int:
 def stopped_by_signals(loop: EventLoop) -> Iterator[None]:
     """Make SIGTERM and SIGINT end `loop.run()`.
 
-    A handler alone would not: Python goes back into the wait after it. The wake-up pipe makes the loop ready.
+    A handler alone would not: Python resumes the wait after it. The wake-up pipe wakes the loop.
     """
     read_end, write_end = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     signals = (signal.SIGTERM, signal.SIGINT)
-    before_fd = signal.set_wakeup_fd(write_end)  # first: a signal between the two would be heard by nobody
+    before_fd = signal.set_wakeup_fd(write_end)  # first: a signal between the two calls would be lost
     before = [signal.signal(number, _note) for number in signals]
     loop.add_fd(read_end, lambda _: loop.stop())
     try:
@@ -114,7 +116,7 @@ def stopped_by_signals(loop: EventLoop) -> Iterator[None]:
 
 
 def _note(_number: int, _frame: FrameType | None) -> None:
-    """Do nothing: the byte in the wake-up pipe does it."""
+    """Do nothing: the byte in the wake-up pipe is the event."""
 
 
 def _open_ft300(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
@@ -153,7 +155,7 @@ def _open_all(loop: EventLoop, args: argparse.Namespace, opened: contextlib.Exit
 
 
 def _loopback(text: str) -> str:
-    """Return `text` when it is an IPv4 loopback address; UsageError otherwise."""
+    """Return `text` if it is an IPv4 loopback address. Raises UsageError otherwise."""
     try:
         loopback = ipaddress.IPv4Address(text).is_loopback
     except ValueError:
@@ -166,7 +168,7 @@ def _loopback(text: str) -> str:
 
 
 def _port(text: str) -> int:
-    """Return a TCP port number; UsageError otherwise."""
+    """Return a TCP port number. Raises UsageError for anything else."""
     if not (text.isascii() and text.isdigit() and int(text) <= 65535):
         raise UsageError(f"{text!r} is not a TCP port", where="command line", do="Give 0..65535")
     return int(text)

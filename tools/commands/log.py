@@ -1,6 +1,6 @@
-"""`push log info|cat|export|recover LOG`: look into a log, print it, make tables of it, save a truncated one.
+"""`push log info|cat|export|recover LOG`: inspect a log, print it, export it as tables, repair a truncated one.
 
-A log is checked to its last byte before its content is believed; a damaged one is exit code 8 with what to do.
+A log is verified to its last byte before its content is used; a damaged one ends with exit code 8 and what to do.
 """
 
 from __future__ import annotations
@@ -20,37 +20,41 @@ from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
 from robot_io.log.recovery import recover
 from robot_io.mcap.read import LogSummary, read_summary
 from tools.log.decode import Decoders, columns
-from tools.places.at_rest import at_rest, comes_once
 from tools.places.find_log import find_log
+from tools.places.stream_file import as_file, is_stream
 
 STANDARD_INPUT = Path("/dev/stdin")
-DO_OTHER_TOOL = "Read it with the tool that wrote it; `push log info` names all that cannot be read here"
+DO_OTHER_TOOL = "Read it with the tool that wrote it; `push log info` lists all topics that cannot be read here"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the actions and their flags."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="info|cat|export|recover")
-    info = actions.add_parser("info", help="what the log holds, with every byte checked")
-    cat = actions.add_parser("cat", help="every message as one line of JSON; NaN and infinities become null")
-    export = actions.add_parser("export", help="one CSV file per topic, units in the head line")
+    info = actions.add_parser("info", help="show what the log holds, with every byte verified")
+    cat = actions.add_parser("cat", help="print every message as one line of JSON; NaN and infinities become null")
+    export = actions.add_parser("export", help="write one CSV file per topic, units in the header line")
     saved = actions.add_parser("recover", help="repair a truncated log")
     for action in (info, cat, export, saved):
         action.add_argument("log", type=Path, help="run.mcap, a run's folder, or - for a pipe")
         action.add_argument("--json", action="store_true", help="one JSON object on stdout, last")
     for action in (cat, export):
         action.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these topics")
-    export.add_argument("--out", type=Path, metavar="DIR", help="directory of the tables (LOG without .mcap, and _csv)")
-    saved.add_argument("--out", type=Path, metavar="FILE", help="the new log (LOG without .mcap, and _recovered.mcap)")
+    export.add_argument(
+        "--out", type=Path, metavar="DIR", help="directory for the tables (default: LOG without .mcap, plus _csv)"
+    )
+    saved.add_argument(
+        "--out", type=Path, metavar="FILE", help="the new log (default: LOG without .mcap, plus _recovered.mcap)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it; raises UsageError, EnvironmentFault or LogDamaged."""
+    """Run the action; return 0. Raises UsageError, EnvironmentFault or LogDamaged."""
     args.named = STANDARD_INPUT if args.log == Path("-") else find_log(args.log)
     actions = {"info": _info, "cat": _cat, "export": _export, "recover": _recover}
-    unnamed = args.named == STANDARD_INPUT or comes_once(args.named)
+    unnamed = args.named == STANDARD_INPUT or is_stream(args.named)
     if unnamed and args.action in ("export", "recover") and args.out is None:
-        raise UsageError("what comes out of a pipe has no name to make one of", do="Name the result with --out")
-    with at_rest(args.named) as args.log:
+        raise UsageError("a log from a pipe has no file name to name the output after", do="Name the result with --out")
+    with as_file(args.named) as args.log:
         facts = actions[args.action](args)
     if args.json:
         say_json({"schema": SCHEMA, "log": str(args.named), **facts})
@@ -81,7 +85,7 @@ def _info(args: argparse.Namespace) -> dict[str, Any]:
 
 def _table(path: Path, summary: LogSummary, duration_s: float, unreadable: dict[str, str]) -> str:
     width = max((len(c.topic) for c in summary.channels), default=0)
-    lines = [f"{path}: {summary.size_bytes / 1e6:.2f} MB, {duration_s:.2f} s, {summary.messages} messages, whole"]
+    lines = [f"{path}: {summary.size_bytes / 1e6:.2f} MB, {duration_s:.2f} s, {summary.messages} messages, intact"]
     lines += [f"  {c.topic:{width}}  {c.messages:7}  {c.schema_name or '-'}" for c in summary.channels]
     lines += [f"{topic} cannot be read: {why}" for topic, why in unreadable.items()]
     for name, values in summary.metadata.items():
@@ -97,7 +101,7 @@ def _cat(args: argparse.Namespace) -> dict[str, Any]:
         line = {"topic": topic, "log_time_ns": log_time_ns, "type": type_name, "message": value}
         sys.stdout.write(msgspec.json.encode(line).decode() + "\n")
         count += 1
-    return {"messages": count, "unreadable": _told(decoders, args, count)}
+    return {"messages": count, "unreadable": _report_unreadable(decoders, args, count)}
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:
@@ -113,7 +117,7 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
         raise EnvironmentFault(f"the tables cannot be written: {error.strerror}", where=str(out)) from None
     for name, rows in files.items():
         tell(f"{out / name}: {rows} rows")
-    return {"out": str(out), "files": files, "unreadable": _told(decoders, args, sum(files.values()))}
+    return {"out": str(out), "files": files, "unreadable": _report_unreadable(decoders, args, sum(files.values()))}
 
 
 def _write_tables(decoders: Decoders, log: Path, out: Path, start_ns: int) -> dict[str, int]:
@@ -125,7 +129,7 @@ def _write_tables(decoders: Decoders, log: Path, out: Path, start_ns: int) -> di
             cells = columns(shape, value)
             table = (topic, type_name)
             if table not in writers:
-                # Only a log by others has several types of one topic.
+                # Only a log from other software has several types on one topic.
                 several = any(topic == other for other, _ in writers)
                 name = f"{topic} {type_name}" if several else topic
                 names[table] = name.strip("/").replace("/", "_").replace(" ", ".") + ".csv"
@@ -148,8 +152,8 @@ def _recover(args: argparse.Namespace) -> dict[str, Any]:
     return {"out": str(out), "messages": saved.messages, "cause": saved.cause}
 
 
-def _told(decoders: Decoders, args: argparse.Namespace, messages: int) -> dict[str, str]:
-    """Name what could not be read. Raises LogDamaged when it was asked for by name, or nothing else is there."""
+def _report_unreadable(decoders: Decoders, args: argparse.Namespace, messages: int) -> dict[str, str]:
+    """Print and return what could not be read. Raises LogDamaged if --topics named it or nothing else is there."""
     wanted = [topic for topic in decoders.unreadable if topic in (args.topics or ()) or messages == 0]
     for topic, why in decoders.unreadable.items():
         if topic not in wanted[:1]:

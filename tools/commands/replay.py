@@ -1,4 +1,4 @@
-"""`push replay LOG`: prove that the program of today does, bit for bit, what the log says it did."""
+"""`push replay LOG`: check that today's program computes, bit for bit, what the log holds."""
 
 from __future__ import annotations
 
@@ -27,17 +27,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push replay`."""
     parser.add_argument("log", help="run.mcap, or a run's folder")
     parser.add_argument(
-        "--what-if", action="append", default=[], metavar="KEY=VALUE", help="other settings over the same inputs"
+        "--what-if", action="append", default=[], metavar="KEY=VALUE", help="re-run the same inputs with other settings"
     )
-    parser.add_argument("--tolerance", type=float, metavar="X", help="accept numbers this close (another machine)")
+    parser.add_argument(
+        "--tolerance", type=float, metavar="X", help="accept differences up to X (log from another machine)"
+    )
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Replay; 0 identical, 7 different. Raises LogDamaged (8) for a log that cannot be trusted."""
+    """Replay; return 0 if identical, 7 if different. Raises LogDamaged (8) for a log that cannot be trusted."""
     path = find_log(Path(args.log))
     if args.tolerance is not None and not args.tolerance >= 0.0:
-        raise UsageError(f"--tolerance {args.tolerance} is not a distance", where="push replay", do="Give 0 or more")
+        raise UsageError(f"--tolerance {args.tolerance} is not a tolerance", where="push replay", do="Give 0 or more")
     if args.what_if:
         return what_if(path, args)
     result = replay(path, tolerance=args.tolerance)
@@ -61,7 +63,7 @@ def lines(result: ReplayResult) -> Iterator[str]:
         yield f"arrived: {result.arrived.identical} of {result.arrived.messages} messages as the ticks hold them"
         differences.append(("message at ", result.arrived.first_difference))
     if result.gaps:
-        yield f"gaps: {result.gaps} (ticks missing in the log; the state was taken from the log after each)"
+        yield f"gaps: {result.gaps} (ticks missing in the log; the state after each gap was read from the log)"
     for note in result.notes:
         yield f"note: {note}"
     if result.made_by.note and not result.different:
@@ -117,14 +119,14 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
 
 
 def machine_differences(facts: dict[str, str]) -> list[str]:
-    """Return what else differs between log and today, in words: versions, machine."""
-    said = (FORMAT_FACT, COMMIT_FACT, DIRTY_FACT)
-    now = {name: value for name, value in code_and_machine().items() if name in facts and name not in said}
+    """Return what else differs between the log and now, in words: versions, machine."""
+    reported = (FORMAT_FACT, COMMIT_FACT, DIRTY_FACT)
+    now = {name: value for name, value in code_and_machine().items() if name in facts and name not in reported}
     return [f"{name} was {facts[name]}, is {value}" for name, value in now.items() if facts[name] != value]
 
 
 def what_if(path: Path, args: argparse.Namespace) -> int:
-    """Fold the log's inputs with other settings and say what the law would have commanded."""
+    """Re-run the log's inputs with other settings and print what the law would have commanded."""
     log = VerifiedLog(path)
     log.require_config()
     other = rig_from_toml(rig_to_toml(log.usable_rig()), overrides=args.what_if)
@@ -144,7 +146,7 @@ def what_if(path: Path, args: argparse.Namespace) -> int:
         if off > worst:
             worst, worst_tick = off, tick.input.tick
     show = tell if args.json else print
-    show(f"what if {', '.join(args.what_if)}: commands the law would have given; the world did not answer")
+    show(f"what if {', '.join(args.what_if)}: the commands the law would have given; the world does not react to them")
     show(f"{changed} of {count} ticks would differ, at most by {worst:.4f} m/s (tick {worst_tick})")
     if args.json:
         say_json(

@@ -1,4 +1,4 @@
-"""`push report LOG|DIR`: the page of a run, made again from its log; or several runs side by side in one picture."""
+"""`push report LOG|DIR`: recreate the page of a run from its log, or draw several runs in one picture."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", nargs="+", type=Path, help="run.mcap, or a run's folder; several with --compare")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for report.html (default: beside the log)")
     parser.add_argument("--png", action="store_true", help="also write the figures as PNG files")
-    parser.add_argument("--compare", type=Path, metavar="PNG", help="draw all logs from above into this new picture")
-    parser.add_argument("--json", action="store_true", help="what was written, as one line of JSON, last on stdout")
+    parser.add_argument(
+        "--compare", type=Path, metavar="PNG", help="draw the plan view of all logs into this new picture"
+    )
+    parser.add_argument("--json", action="store_true", help="the paths written, as one line of JSON, last on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write it. Raises UsageError, LogDamaged, EnvironmentFault."""
+    """Write the report or the picture; return 0. Raises UsageError, LogDamaged, EnvironmentFault."""
     logs = [find_log(log) for log in args.log]
     if args.compare is not None:
         written = compare(logs, args)
     elif len(logs) > 1:
         raise UsageError("more than one log", where="push report", do="Give one, or add --compare PNG")
     else:
-        written = one(logs[0], args)
+        written = write_page(logs[0], args)
     for path in written:
         tell(f"wrote {path}")
     if args.json:
@@ -38,8 +40,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def one(log: Path, args: argparse.Namespace) -> list[Path]:
-    """Write report.html, and with --png the figures; return what was written."""
+def write_page(log: Path, args: argparse.Namespace) -> list[Path]:
+    """Write report.html, and with --png the figures; return the paths written."""
     from tools.report.page import write_report
 
     out: Path = args.out or log.parent
@@ -48,10 +50,10 @@ def one(log: Path, args: argparse.Namespace) -> list[Path]:
             out.mkdir(parents=True, exist_ok=True)
         page = out / "report.html"
         figures = [out / f"{name}.png" for name in PNG_NAMES] if args.png else []
-        # A picture beside a report belongs to it, and may be made again with it; any other stays.
-        taken = [figure for figure in figures if figure.exists() and not page.exists()]
-        if taken:
-            raise UsageError("there is already a file of this name", where=str(taken[0]), do="Give another --out")
+        # A picture beside a report belongs to it and may be overwritten with it; any other is kept.
+        existing = [figure for figure in figures if figure.exists() and not page.exists()]
+        if existing:
+            raise UsageError("there is already a file of this name", where=str(existing[0]), do="Give another --out")
         pngs = write_report(log, page)
         for figure in figures:
             figure.write_bytes(pngs[figure.stem])
@@ -61,12 +63,12 @@ def one(log: Path, args: argparse.Namespace) -> list[Path]:
 
 
 def compare(logs: list[Path], args: argparse.Namespace) -> list[Path]:
-    """Draw the plan view of all logs; return what was written."""
+    """Draw the plan view of all logs; return the path written."""
     from tools.report.plan_view import write_compare
 
     if args.out is not None or args.png:
         raise UsageError(
-            "--compare makes one picture and nothing else", where="push report", do="Leave --out and --png"
+            "--compare writes one picture and nothing else", where="push report", do="Leave out --out and --png"
         )
     try:
         write_compare(logs, args.compare)

@@ -12,9 +12,9 @@ from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
+from tools.places.atomic_file import write_json
 from tools.places.saved_tare import SavedTare
 from tools.places.state_dir import RigLock
-from tools.places.whole_file import write_json
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig
 from tools.run.run_facts import level_of
@@ -23,28 +23,32 @@ from tools.terminal import verdict
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
 
-LARGEST_SEED = 2**63 - 1
-"""What the log can hold."""
+MAX_SEED = 2**63 - 1
+"""The largest integer that the log can hold."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push run`."""
     parser.add_argument("rig", nargs="?", default="emulated", help="a shipped rig or a TOML file (default: emulated)")
     parser.add_argument("--distance-m", type=float, help="how far to push, from first contact")
-    parser.add_argument("--controller", choices=("force", "open-loop"), help="force (the law) or straight ahead")
+    parser.add_argument(
+        "--controller", choices=("force", "open-loop"), help="force (the pushing law) or open-loop (straight ahead)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of the simulated world (0)")
     parser.add_argument("--out", help="folder for the run, created (default: runs/RIG-TIME)")
     parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
-    parser.add_argument("--fast", action="store_true", help="level sim only: as fast as it goes")
-    parser.add_argument("--start-in-contact", action="store_true", help="with a tare saved in this power cycle")
-    parser.add_argument("--dry-run", action="store_true", help="show what would run, and connect to nothing")
+    parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
+    parser.add_argument(
+        "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
+    )
+    parser.add_argument("--dry-run", action="store_true", help="show what would run, without connecting to anything")
     parser.add_argument("--move-robot", action="store_true", help="needed before any real device is opened")
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Push; return the run's exit code. Raises PushError where it could not begin."""
+    """Push; return the run's exit code. Raises PushError if the run could not start."""
     rig = resolve_rig(args.rig, overrides(args))
     check_flags(args, rig)
     if warning := gain_warning(rig):
@@ -54,12 +58,12 @@ def run(args: argparse.Namespace) -> int:
         return dry_run(args, rig)
     simulated = bool(devices_at(rig, "sim"))
     if not simulated:
-        announce(rig)
+        print_levels(rig)
     with RigLock(rig.name) if not simulated else _NoLock():
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
-            summary = lockstep(args, rig, out, saved) if simulated else wall_clock(args, rig, out, saved)
+            summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
         except BaseException:
             if early is not None:
                 early.drop()
@@ -67,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     summary["report"] = None
     write_summary(summary, out)
     if not args.no_report:
-        report(summary, out, early)
+        write_report(summary, out, early)
         write_summary(summary, out)
     with ignoring_output_errors():
         for line in verdict.person_lines(summary):
@@ -78,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def overrides(args: argparse.Namespace) -> list[str]:
-    """Return the settings that the flags stand for, after those of `--set`."""
+    """Return the settings of `--set`, followed by those of the other flags."""
     found = list(args.overrides)
     if args.distance_m is not None:
         found.append(f"control.distance_m={args.distance_m!r}")
@@ -90,7 +94,7 @@ def overrides(args: argparse.Namespace) -> list[str]:
 
 
 def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
-    """Raise UsageError for flags that contradict the rig; nothing was opened yet."""
+    """Raise UsageError for flags that contradict the rig; nothing has been opened yet."""
     hardware = devices_at(rig, "hardware")
     if hardware and not args.move_robot and not args.dry_run:
         raise UsageError(
@@ -100,19 +104,19 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
         )
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
-    if not 0 <= args.seed <= LARGEST_SEED:
-        raise UsageError(f"--seed {args.seed} is out of range", where="push run", do=f"Give 0 to {LARGEST_SEED}")
+    if not 0 <= args.seed <= MAX_SEED:
+        raise UsageError(f"--seed {args.seed} is out of range", where="push run", do=f"Give 0 to {MAX_SEED}")
 
 
-def announce(rig: RigConfig) -> None:
-    """Say which devices are real, and the limits in force."""
+def print_levels(rig: RigConfig) -> None:
+    """Print the level of each device, and the address of the real ones."""
     for device, level in (("ft", rig.ft.level), ("arm", rig.arm.level), ("base", rig.base.level)):
         where = {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}[device]
         tell(f"{device:<5} {level:<9} {where if level == 'hardware' else ''}".rstrip())
 
 
 def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
-    """Show what would run."""
+    """Print what would run; return 0."""
     sensor, arm, base = device_names(rig)
     facts = {
         "schema": 1,
@@ -127,14 +131,14 @@ def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
         "controller": rig.control.controller,
         "push_speed_m_per_s": rig.control.push_speed_m_per_s,
     }
-    announce(rig)
+    print_levels(rig)
     tell(f"would push {rig.control.distance_m:g} m at {rig.control.push_speed_m_per_s:g} m/s; nothing was opened")
     if args.json:
         say_json(facts)
     return 0
 
 
-def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
     """Run the processes of a wall-clock run and return its summary."""
     launcher = None
     try:
@@ -146,7 +150,7 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Saved
         if launcher is None or not launcher.began:
             run_dir.discard(out)
         raise
-    keep_tare(rig, figures)
+    save_tare(rig, figures)
     return verdict.summary(
         rig,
         figures,
@@ -159,7 +163,7 @@ def wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Saved
     )
 
 
-def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
     """Run level sim in this process and return its summary."""
     from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
@@ -167,7 +171,7 @@ def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTa
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved)
-    except PushError:  # a world that cannot be: nothing has begun
+    except PushError:  # an impossible world: nothing has started
         log.abandon()
         run_dir.discard(out)
         raise
@@ -187,13 +191,13 @@ def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTa
             figures = one.run(on_tick)
         finally:
             log.finish({})
-    except OSError as error:  # nothing but the log is outside of this process here
+    except OSError as error:  # only the log is outside this process here
         log.abandon()
         raise EnvironmentFault(
-            f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Make room there"
+            f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Free some space"
         ) from None
     live.end()
-    keep_tare(rig, figures)
+    save_tare(rig, figures)
     return verdict.summary(
         rig,
         figures,
@@ -206,26 +210,26 @@ def lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTa
     )
 
 
-def keep_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
-    """Keep the tare of a run that got that far, for `--start-in-contact`; when it cannot be, say so."""
+def save_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
+    """Save the tare, if the run got that far, for `--start-in-contact`; print a message if that fails."""
     if figures["tared"]:
         bias = (*figures["bias_force_N"], *figures["bias_torque_Nm"])
         try:
             saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
         except (OSError, EnvironmentFault) as error:
-            tell(f"the tare was not kept: {error}")
+            tell(f"the tare was not saved: {error}")
 
 
 def write_summary(summary: dict[str, Any], out: Path) -> None:
-    """Write summary.json; when it cannot be, say so: the verdict is printed all the same."""
+    """Write summary.json; print a message if that fails: the verdict is printed in any case."""
     try:
         write_json(out / "summary.json", summary)
     except OSError as error:
         tell(f"summary.json cannot be written: {error.strerror}")
 
 
-def report(summary: dict[str, Any], out: Path, ready: ReportProcess | None) -> None:
-    """Write report.html, by the process that is `ready` or a new one, and name it in `summary`."""
+def write_report(summary: dict[str, Any], out: Path, ready: ReportProcess | None) -> None:
+    """Write report.html, with the process `ready` or a new one, and name it in `summary`."""
     try:
         making = ready or ReportProcess(Path(summary["log"]), out / "report.html")
         reason = making.make()

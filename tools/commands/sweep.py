@@ -1,4 +1,4 @@
-"""`push sweep`: many simulated pushes at once; without a grid, the paper's whole simulation study."""
+"""`push sweep`: many simulated pushes at once; without a grid, the paper's complete simulation study."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("grid", nargs="?", default="paper", help="paper (default), hardware, or a TOML grid file")
     parser.add_argument("--out", help="folder for the results (default: sweeps/NAME-TIME)")
-    parser.add_argument("--resume", action="store_true", help="go on with the study in --out, skipping what is done")
+    parser.add_argument("--resume", action="store_true", help="continue the study in --out, skipping finished parts")
     parser.add_argument("--gains", metavar="K_F,K_Y", help="gains for all cases, for example --gains=0.1,0.3")
     parser.add_argument("--open-loop", action="store_true", help="push straight along the path in all cases")
     parser.add_argument("--dt", type=float, metavar="S", help="simulation step in s")
-    parser.add_argument("--workers", type=int, metavar="N", help="worker processes (default: one a core)")
-    parser.add_argument("--engine", choices=("joblib", "dask"), default="joblib", help="where the work is done")
+    parser.add_argument("--workers", type=int, metavar="N", help="worker processes (default: one per core)")
+    parser.add_argument("--engine", choices=("joblib", "dask"), default="joblib", help="what runs the work")
     parser.add_argument("--scheduler", metavar="ADDR", help="Dask scheduler, for example tcp://127.0.0.1:8786")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
@@ -41,9 +41,9 @@ def run(args: argparse.Namespace) -> int:
     plan = _plan(args)
     workers = default_workers() if args.workers is None else args.workers
     if workers < 1:
-        raise UsageError(f"--workers {workers} cannot work", do="Give at least 1")
+        raise UsageError(f"--workers {workers} is not possible", do="Give at least 1")
     if args.resume and not args.out:
-        raise UsageError("--resume needs the folder to go on with", do="Add --out DIR")
+        raise UsageError("--resume needs the folder of the study to continue", do="Add --out DIR")
     out = Path(args.out) if args.out else Path("sweeps") / f"{plan.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     with _terminate_as_interrupt(), engine(args.engine, args.scheduler):
         store = Store(out, plan.name, fingerprint(plan.definition, plan.sources), resume=args.resume)
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
             raise OperatorStop(
                 f"stopped with {progress.done} of {progress.total} cases done",
                 where=str(out),
-                do=f"Go on with the same command and --out {out} --resume",
+                do=f"Continue with the same command and --out {out} --resume",
             ) from None
         finally:
             progress.close()
@@ -91,7 +91,7 @@ def _plan(args: argparse.Namespace) -> Plan:
 
 @contextlib.contextmanager
 def _terminate_as_interrupt() -> Iterator[None]:
-    """Make SIGTERM what Ctrl-C is: what is finished stays, the workers end."""
+    """Make SIGTERM act as Ctrl-C: finished parts are kept and the workers end."""
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -111,13 +111,13 @@ def _gains(text: str) -> tuple[float, float]:
         k_f = k_y = float("nan")
     if not (0 <= k_f <= 10 and 0 <= k_y <= 10):
         raise UsageError(
-            f"`{text}` are not two gains between 0 and 10", where="--gains", do="For example --gains=0.1,0.3"
+            f"`{text}` is not a pair of gains between 0 and 10", where="--gains", do="For example --gains=0.1,0.3"
         )
     return k_f, k_y
 
 
 class Progress:
-    """One line on a terminal: cases done, rate, and the time left; nothing where no one looks."""
+    """One line on a terminal: cases done, rate and time left; nothing if stderr is not a terminal."""
 
     def __init__(self, total: int, done: int) -> None:
         self.total, self.done = total, done
@@ -126,7 +126,7 @@ class Progress:
         self._shown = sys.stderr is not None and sys.stderr.isatty()
 
     def add(self, cases: int) -> None:
-        """Count finished cases and show it."""
+        """Count finished cases and update the line."""
         self.done += cases
         if self._shown:
             rate = (self.done - self._before) / max(time.monotonic() - self._began, 1e-6)
@@ -135,6 +135,6 @@ class Progress:
             sys.stderr.flush()
 
     def close(self) -> None:
-        """Leave the line."""
+        """Move on to a new line."""
         if self._shown and self.done > self._before:
             sys.stderr.write("\n")

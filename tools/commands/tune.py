@@ -1,7 +1,7 @@
-"""`push tune`: from what is known of the sliders to gains: the stable region, a recommendation, and what it costs.
+"""`push tune`: gains for the sliders one expects: the stable region, a recommendation and its cost.
 
-The region is the closed form of `sim_backend.physics.gain_limits` over all assumed sliders; where it binds, it is
-found again by simulation.
+The region is the closed form of `sim_backend.physics.gain_limits` over all assumed sliders; the sliders that bind it
+are checked by simulation.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from sim_backend.physics.gain_limits import (
 from sim_backend.physics.slider import Circle, Pressure, Rectangle
 from tools.study.tune_map import PRESETS
 
-Word = TypeVar("Word", bound=str)
+Choice = TypeVar("Choice", bound=str)
 SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
 PRESSURES: tuple[Pressure, ...] = ("uniform", "rim", "point")
 MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
 SHARE = 0.5
-"""The recommended k_y is this share of its limit: twice the gain, or half the margin assumed, is still stable."""
-CHECK_WITHIN = 0.01
-"""How closely simulation has to find the closed form's limits."""
-MOST_K_F_SHARE = 0.5
-"""The recommended k_f stays below this share of the one at which the force angle itself runs away."""
+"""The recommended k_y is this share of its limit: twice the gain is still stable."""
+CHECK_TOLERANCE = 0.01
+"""Largest relative difference between the limits by simulation and by the closed form."""
+MAX_K_F_SHARE = 0.5
+"""The recommended k_f stays below this share of the k_f at which the force angle itself becomes unstable."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("--shapes", default="box,circle", help="box, circle or both (default: box,circle)")
     parser.add_argument("--size-m", default="0.3,0.7", metavar="LOW,HIGH", help="length along the push, or diameter")
-    parser.add_argument("--width-m", metavar="LOW,HIGH", help="width of a box across the push (default: as long)")
-    parser.add_argument("--pressures", default="uniform,rim", help="of uniform, rim, point (default: uniform,rim)")
+    parser.add_argument("--width-m", metavar="LOW,HIGH", help="width of a box across the push (default: its length)")
+    parser.add_argument("--pressures", default="uniform,rim", help="any of uniform, rim, point (default: uniform,rim)")
     parser.add_argument(
         "--turning", choices=("ellipsoid", "along-push"), default="ellipsoid",
         help="what resists turning: the ellipsoid (default, cautious), or the pressure along the push",
@@ -58,7 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--floor-friction", type=float, default=0.3, metavar="MU", help="friction of the floor")
     parser.add_argument(
-        "--anisotropy", type=float, default=1.0, metavar="RATIO", help="floor friction along the path over across"
+        "--anisotropy",
+        type=float,
+        default=1.0,
+        metavar="RATIO",
+        help="floor friction along the path divided by that across it",
     )
     parser.add_argument(
         "--slide-force-N", type=float, default=15.0, metavar="N", help="force that keeps a slider moving"
@@ -67,26 +71,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--k-f", type=float, default=0.3, metavar="K_F", help="k_f to recommend a k_y for (default: 0.3)"
     )
     parser.add_argument("--out", help="folder for the map (default: sweeps/tune-TIME)")
-    parser.add_argument("--no-check", action="store_true", help="leave out the simulations")
+    parser.add_argument("--no-check", action="store_true", help="skip the simulations")
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Tune and tell; return the exit code."""
+    """Find gains and print them; return the exit code. Raises UsageError."""
     bodies = assumed_bodies(args)
     fast = fast_loop_k_f(bodies)
     if not (math.isfinite(args.k_f) and args.k_f > 0):
         raise UsageError("this is not a positive, finite number", where="--k-f")
-    k_f = args.k_f if args.k_f <= MOST_K_F_SHARE * fast else _rounded_down(max(MOST_K_F_SHARE * fast, 1e-9))
+    k_f = args.k_f if args.k_f <= MAX_K_F_SHARE * fast else _rounded_down(max(MAX_K_F_SHARE * fast, 1e-9))
     highest = limit(bodies, k_f)
     if highest <= 0:
         raise UsageError(
             f"no k_y is stable for all these sliders at k_f = {k_f:.3g}",
-            do="Raise --k-f, or assume less of the sliders",
+            do="Raise --k-f, or narrow the ranges of the sliders",
         )
     k_y = _rounded_down(SHARE * highest)
     out = _folder(args.out)
-    checks = [] if args.no_check else check(bodies, k_f)
+    checks = [] if args.no_check else check_limits(bodies, k_f)
     what = f"{args.shapes} of {args.size_m} m, pressure {args.pressures}, ball {args.ball_radius_m:g} m"
     files = _draw(bodies, (k_f, k_y), what, out)
     result: dict[str, Any] = {
@@ -109,23 +113,23 @@ def run(args: argparse.Namespace) -> int:
             for name, (f, y) in PRESETS.items()
         ],
         "checks": checks,
-        "checks_within": CHECK_WITHIN,
-        "checks_passed": all(abs(entry["difference"]) <= CHECK_WITHIN for entry in checks) if checks else None,
+        "checks_within": CHECK_TOLERANCE,
+        "checks_passed": all(abs(entry["difference"]) <= CHECK_TOLERANCE for entry in checks) if checks else None,
         "out": str(out),
         "files": files,
     }
-    _tell(result, args)
+    _print_result(result, args)
     if args.json:
         say_json({"schema": 1, **result})
     return 0
 
 
 def assumed_bodies(args: argparse.Namespace) -> list[PushedBody]:
-    """Return the sliders the arguments assume: the corners of their ranges and some between. Raises UsageError."""
-    lengths = _between(args.size_m, "--size-m")
-    widths = _between(args.width_m, "--width-m") if args.width_m else None
-    shapes = _words(args.shapes, SHAPES, "--shapes")
-    pressures = _words(args.pressures, PRESSURES, "--pressures")
+    """Return the sliders the arguments assume: the ends of their ranges and some between. Raises UsageError."""
+    lengths = _range_samples(args.size_m, "--size-m")
+    widths = _range_samples(args.width_m, "--width-m") if args.width_m else None
+    shapes = _choices(args.shapes, SHAPES, "--shapes")
+    pressures = _choices(args.pressures, PRESSURES, "--pressures")
     for name in ("ball_radius_m", "push_height_m", "floor_friction"):
         if not 0 <= getattr(args, name) < math.inf:
             raise UsageError("this is not a number of at least 0", where=f"--{name.replace('_', '-')}")
@@ -149,8 +153,8 @@ def assumed_bodies(args: argparse.Namespace) -> list[PushedBody]:
     return bodies
 
 
-def check(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
-    """Find the limit of the sliders that bind, one a formula, by simulation; return both and their difference."""
+def check_limits(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
+    """Simulate the limiting slider of each formula; return both limits and their relative difference."""
     from tools.study.gain_check import simulated_limit
 
     formulas: dict[str, Callable[[PushedBody, float], float]] = {
@@ -160,7 +164,7 @@ def check(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
     found = []
     for shape, chosen in (("box", [b for b in bodies if not b.round]), ("circle", [b for b in bodies if b.round])):
         for contact, formula in formulas.items() if chosen else ():
-            body = min(chosen, key=partial(_at, formula, k_f))
+            body = min(chosen, key=partial(_limit_at, formula, k_f))
             expected = formula(body, k_f)
             simulated = simulated_limit(body, k_f, frictionless=contact == "frictionless", near=expected)
             found.append(
@@ -177,11 +181,11 @@ def check(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
     return found
 
 
-def _at(formula: Callable[[PushedBody, float], float], k_f: float, body: PushedBody) -> float:
+def _limit_at(formula: Callable[[PushedBody, float], float], k_f: float, body: PushedBody) -> float:
     return formula(body, k_f)
 
 
-def _tell(result: dict[str, Any], args: argparse.Namespace) -> None:
+def _print_result(result: dict[str, Any], args: argparse.Namespace) -> None:
     best = result["recommended"]
     tell(
         f"recommended: k_f {best['k_f']:.3g}, k_y {best['k_y_rad_per_m']:.3g} rad/m, a margin of "
@@ -190,8 +194,8 @@ def _tell(result: dict[str, Any], args: argparse.Namespace) -> None:
     )
     if best["k_f"] < args.k_f:
         tell(
-            f"  k_f {args.k_f:g} is not taken: beyond {result['fast_loop_k_f']:.3g} the force's direction runs away "
-            f"for some slider, and the recommended k_f stays below {MOST_K_F_SHARE:g} of that"
+            f"  k_f {args.k_f:g} is not used: beyond {result['fast_loop_k_f']:.3g} the force's direction is unstable "
+            f"for some slider, and the recommended k_f stays below {MAX_K_F_SHARE:g} of that"
         )
     tell(
         f"what it costs: {result['offset_m_per_degree']:.2g} m of steady offset for each degree of error in the "
@@ -199,8 +203,8 @@ def _tell(result: dict[str, Any], args: argparse.Namespace) -> None:
     )
     for preset in result["presets"]:
         share = preset["share_of_limit"]
-        told = "no k_y is stable at this k_f" if share is None else f"{share:.2f} of the limit"
-        tell(f"  {preset['name']} {preset['k_f']:g}/{preset['k_y_rad_per_m']:g}: {told}")
+        margin = "no k_y is stable at this k_f" if share is None else f"{share:.2f} of the limit"
+        tell(f"  {preset['name']} {preset['k_f']:g}/{preset['k_y_rad_per_m']:g}: {margin}")
     for entry in result["checks"]:
         tell(
             f"  simulated: {entry['shape']} {entry['contact']}, limit {entry['simulated_k_y']:.4g} "
@@ -213,7 +217,7 @@ def _draw(bodies: Sequence[PushedBody], recommended: tuple[float, float], what: 
     from tools.study.figures import save
     from tools.study.tune_map import draw
 
-    fast = fast_loop_k_f(bodies)  # a cliff, not a slope
+    fast = fast_loop_k_f(bodies)  # the limit drops to zero here, without a slope
     k_f = sorted((*MAP_K_F, *((math.nextafter(fast, 0.0), fast) if MAP_K_F[0] < fast < MAP_K_F[-1] else ())))
     return save(draw([(f, limit(bodies, f)) for f in k_f], recommended, what), out, "gain_map")
 
@@ -231,8 +235,8 @@ def _folder(out: str | None) -> Path:
     return path
 
 
-def _between(text: str, where: str) -> list[float]:
-    """Return samples of a range `low,high`, both ends among them."""
+def _range_samples(text: str, where: str) -> list[float]:
+    """Return samples of a range `low,high`, including both ends. Raises UsageError."""
     try:
         low, high = (float(part) for part in text.split(","))
     except ValueError:
@@ -244,7 +248,7 @@ def _between(text: str, where: str) -> list[float]:
     return samples(low, high)
 
 
-def _words(text: str, known: tuple[Word, ...], where: str) -> list[Word]:
+def _choices(text: str, known: tuple[Choice, ...], where: str) -> list[Choice]:
     by_name = {str(word): word for word in known}
     for word in text.split(","):
         if word not in by_name:

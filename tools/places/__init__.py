@@ -1,1 +1,1 @@
-"""Where things are kept: run folders, locks, saved tares, logs that a user names."""
+"""Where files are kept: run folders, locks, saved tares, logs that a user names."""

@@ -1,4 +1,4 @@
-"""Where the log is that a user names."""
+"""Find the log that a user names."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from robot_io.errors import UsageError
 
 
 def find_log(named: Path) -> Path:
-    """Return `named`, or the run.mcap in it when it is a run's folder.
+    """Return `named`, or the run.mcap in it if it is a run's folder.
 
-    Raises UsageError when that has none, or may not be looked into.
+    Raises UsageError if the folder has none or cannot be read.
     """
     log = named / "run.mcap"
     try:

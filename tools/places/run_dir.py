@@ -9,22 +9,22 @@ from pathlib import Path
 
 from robot_io.errors import UsageError
 from robot_io.rig.config import RigConfig, rig_to_toml
-from tools.places.whole_file import check_writable
+from tools.places.atomic_file import check_writable
 
-MOST_IN_A_SECOND = 1000
+MAX_RUNS_PER_SECOND = 1000
 RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
 
 
 def create(out: str | None, rig_name: str) -> Path:
-    """Create and return the run's folder (default: `runs/RIG-TIME`, with a number when there is one already).
+    """Create and return the run's folder (default: `runs/RIG-TIME`, with a number if that exists).
 
-    Raises UsageError when it already holds a run, or cannot be made.
+    Raises UsageError if it already holds a run or cannot be created.
     """
     path = Path(out) if out else Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
         if any((path / name).exists() for name in RUN_FILES) and out:
             raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
-        path = _made(path, given=bool(out))
+        path = _make_folder(path, given=bool(out))
         check_writable(path)
     except OSError as error:
         raise UsageError(
@@ -33,12 +33,12 @@ def create(out: str | None, rig_name: str) -> Path:
     return path
 
 
-def _made(path: Path, *, given: bool) -> Path:
-    """Make the folder; one that was not given must be new, because runs may start within the same second."""
+def _make_folder(path: Path, *, given: bool) -> Path:
+    """Create and return the folder; a default one must be new, because runs may start within the same second."""
     if given:
         path.mkdir(parents=True, exist_ok=True)
         return path
-    for number in range(1, MOST_IN_A_SECOND):
+    for number in range(1, MAX_RUNS_PER_SECOND):
         numbered = path if number == 1 else path.with_name(f"{path.name}-{number}")
         with contextlib.suppress(FileExistsError):
             numbered.mkdir(parents=True)
@@ -47,7 +47,7 @@ def _made(path: Path, *, given: bool) -> Path:
 
 
 def discard(path: Path) -> None:
-    """Remove the files of a run that never began, and the folder when nothing else is in it."""
+    """Remove the files of a run that did not start, and the folder if nothing else is in it."""
     for name in RUN_FILES:
         (path / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):

@@ -1,7 +1,7 @@
-"""A tare kept for `--start-in-contact`: valid for the same sensor, as long as it stays powered.
+"""A tare saved for `--start-in-contact`: valid for the same sensor while it stays powered.
 
-The FT 300 has no power-on counter, so a saved tare counts only on the same boot of this machine and for half a
-day; an emulated or simulated sensor is "powered" as long as its settings stay the same.
+The FT 300 has no power-on counter, so a saved tare is valid only until this machine reboots and for half a day; an
+emulated or simulated sensor counts as powered while its settings stay the same.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import msgspec
 from robot_io.errors import UsageError
 from robot_io.messages import Vector6
 from robot_io.rig.config import RigConfig
+from tools.places.atomic_file import write_atomically
 from tools.places.state_dir import file_name, state_dir
-from tools.places.whole_file import write_whole
 
 MAX_AGE_S = 12 * 3600.0
 
 
 class SavedTare(msgspec.Struct, frozen=True):
-    """Bias in N and N*m (SENSOR frame), and what it is valid for: the joints of the arm (rad), the power cycle."""
+    """Bias in N and N*m (SENSOR frame), and what it is valid for: joint positions of the arm (rad) and power cycle."""
 
     bias: Vector6
     joints: Vector6
@@ -31,7 +31,7 @@ class SavedTare(msgspec.Struct, frozen=True):
 
 
 def power_cycle(rig: RigConfig) -> str:
-    """Return what stands for the sensor's power cycle."""
+    """Return an identifier of the sensor's power cycle."""
     if rig.ft.level == "hardware":
         boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
         return f"{rig.ft.port} {boot} {_digest((rig.ft.kind, rig.ft.options, rig.ft.declared))}"
@@ -43,13 +43,13 @@ def _digest(parts: object) -> str:
 
 
 def save(rig: RigConfig, bias: Vector6, joints: Vector6) -> None:
-    """Keep a tare for later runs of this rig."""
+    """Save a tare for later runs of this rig. Raises OSError and EnvironmentFault."""
     tare = SavedTare(bias, joints, power_cycle(rig), time.time())
-    write_whole(_path(rig), msgspec.json.encode(tare))
+    write_atomically(_path(rig), msgspec.json.encode(tare))
 
 
 def load(rig: RigConfig) -> SavedTare:
-    """Return the saved tare. Raises UsageError when there is none that is valid now."""
+    """Return the saved tare. Raises UsageError if there is no valid one."""
     try:
         tare = msgspec.json.decode(_path(rig).read_bytes(), type=SavedTare)
     except (OSError, msgspec.MsgspecError):

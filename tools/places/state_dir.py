@@ -1,4 +1,4 @@
-"""Where the program keeps what outlives a run: locks and saved tares, per user."""
+"""The user's folder for what outlives a run: locks and saved tares."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from robot_io.errors import EnvironmentFault
 
 
 def state_dir() -> Path:
-    """Return the user's state folder of this program (XDG_STATE_HOME), created."""
+    """Create and return the user's state folder for this program (XDG_STATE_HOME). Raises EnvironmentFault."""
     root = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     path = Path(root) / "single-point-push"
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise EnvironmentFault(
-            f"the state folder cannot be made: {error.strerror}", where=str(path), do="Set XDG_STATE_HOME"
+            f"the state folder cannot be created: {error.strerror}", where=str(path), do="Set XDG_STATE_HOME"
         ) from None
     return path
 
 
 def file_name(rig_name: str) -> str:
-    """Return a rig's name as the name of a file."""
+    """Return a rig's name as a file name."""
     return re.sub(r"[^A-Za-z0-9._-]", "_", rig_name) or "rig"
 
 
@@ -33,7 +33,7 @@ class RigLock:
     """At most one run per rig on this machine; held until the process ends, released by the kernel."""
 
     def __init__(self, rig_name: str) -> None:
-        """Take the lock. Raises EnvironmentFault when another run holds it, or its file cannot be opened."""
+        """Acquire the lock. Raises EnvironmentFault if another run holds it or its file cannot be opened."""
         self._path = state_dir() / f"{file_name(rig_name)}.lock"
         try:
             self._fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)

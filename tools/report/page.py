@@ -21,7 +21,7 @@ from typing import Any
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.mcap.walk import Grown
 from safety.faults import FAULTS
-from tools.places.whole_file import write_whole
+from tools.places.atomic_file import write_atomically
 from tools.report import run_summary
 from tools.report.growing_log import GrowingLog
 from tools.report.run_data import RunData, read_run
@@ -57,7 +57,7 @@ def write_report(log: Path, out_html: Path, *, grown: Grown | None = None) -> di
     pngs = figures(run)
     text = page(run, read_summary_file(log.with_name("summary.json")), pngs, mark)
     try:
-        write_whole(out_html, text.encode())
+        write_atomically(out_html, text.encode())
     except OSError as error:
         raise EnvironmentFault(f"the report cannot be written: {error.strerror}", where=str(out_html)) from None
     return pngs

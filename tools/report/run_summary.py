@@ -16,7 +16,7 @@ from tools.kinds import device_names
 from tools.report.bounded_series import Floats
 from tools.report.run_data import RunData
 from tools.report.style import phase_spans
-from tools.terminal.verdict import VERDICTS, lost
+from tools.terminal.verdict import VERDICTS, contact_loss_reason
 
 
 class Verdict(NamedTuple):
@@ -51,7 +51,9 @@ def verdict(run: RunData) -> Verdict:
         return Verdict(f"Pushed {distance}", f"Lateral error at the end: {lateral}.", True)
     name = VERDICTS.get(last.output.exit_code, "error")
     if not why:
-        why = lost(last.after.control.contact_seen) if name == "contact lost" else "see the safety events"
+        why = (
+            contact_loss_reason(last.after.control.contact_seen) if name == "contact lost" else "see the safety events"
+        )
     return Verdict(
         f"{name.capitalize()} after {distance}", f"{why.capitalize()}. Lateral offset at the end: {lateral}.", False
     )

@@ -1,1 +1,1 @@
-"""What one push is made of: its processes, its folder, its state and its end."""
+"""The parts of one push: its processes, its initial state and its result."""

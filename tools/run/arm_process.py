@@ -1,6 +1,6 @@
-"""An arm of somebody else in a run: `python -m tools.run.arm_process` (job on stdin). Publishes one shared record.
+"""The process of an external arm driver: `python -m tools.run.arm_process` (job on stdin). Publishes one shared record.
 
-Its driver may block or crash without touching the loop, which only sees a record that grows old.
+The driver may block or crash without affecting the loop, which only sees a record that gets old.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from tools.run.jobs import ArmKindJob
 
 PRIORITY = 81
 PERIOD_NS = 4 * NS_PER_MS
-"""How often the driver is drained, and a record published."""
+"""How often the driver is drained and a record is published."""
 
 
 def main() -> int:
-    """Serve until SIGTERM; the exit code is that of the error when the arm could not be opened."""
+    """Serve until SIGTERM; return the exit code, that of the error if the arm could not be opened."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=ArmKindJob)
     die_with_parent(job.launcher_pid)
@@ -59,7 +59,7 @@ def main() -> int:
             newest = publish(driver, record, newest, servo=arm.hold == "servo")
             if newest.link == LinkState.LOST:
                 lost = DeviceUnreachable(
-                    driver.health().cause or "its link is gone", where=arm.host, do="Look at the arm"
+                    driver.health().cause or "its link is lost", where=arm.host, do="Check the arm"
                 )
                 status.error(lost)
                 return lost.exit_code
@@ -71,12 +71,12 @@ def main() -> int:
 
 
 def publish(driver: Driver[JointState], record: TypedRecord[ArmRecord], before: ArmRecord, *, servo: bool) -> ArmRecord:
-    """Publish the newest state of the driver, also when there is no new one; return it."""
+    """Publish the driver's newest state, even if it has not changed; return it."""
     samples, link, now_ns = driver.drain(), driver.health().state, monotonic_ns()
     newest = before
     if samples:
         sample = samples[-1]
-        arrived = min(sample.received_ns, now_ns)  # a stamp from the future would never grow old
+        arrived = min(sample.received_ns, now_ns)  # a time stamp in the future would never get old
         newest = msgspec.structs.replace(before, joints=sample.value, packets=sample.seq, changed_ns=arrived)
     holds = servo and link == LinkState.UP and newest.joints.state == ArmState.HOLDING
     newest = msgspec.structs.replace(newest, link=int(link), servo=holds, published_ns=now_ns)

@@ -1,4 +1,4 @@
-"""Which code makes a log: format, commit, uncommitted changes, and the versions of the packages that matter."""
+"""The code that writes a log: format, commit, uncommitted changes, and the versions of the packages that matter."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ COMMIT_FACT, DIRTY_FACT, PROGRAM_FACT = "commit", "dirty", "program"
 GIT_MAX_S = 0.2
 _CHECKOUT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("numpy", "mcap", "msgspec", "ur-rtde")
-# Only what is asked for: it writes nothing into the repository, and starts no program that its settings name.
+# Read only: git writes nothing into the repository and starts no program that its settings name.
 _GIT = ("git", "--no-optional-locks", "-c", "core.fsmonitor=false", "status", "--porcelain=v2", "--branch", "-uno")
 
 
 @cache
 def code_facts() -> dict[str, str]:
-    """Return the facts, asked once in a process; without a checkout, or where git does not answer, no commit."""
+    """Return the facts, collected once per process; no commit without a checkout or if git does not answer."""
     return {
         FORMAT_FACT: str(LOG_FORMAT),
         PROGRAM_FACT: f"single-point-push {__version__}",
@@ -31,8 +31,8 @@ def code_facts() -> dict[str, str]:
 
 
 def commit_of(checkout: Path) -> dict[str, str]:
-    """Return commit and dirty flag ("True": tracked files were changed) of a checkout; nothing where there is none."""
-    if not (checkout / ".git").exists():  # else git would answer for a repository around it
+    """Return commit and dirty flag ("True": tracked files were changed) of a checkout; empty if it is not one."""
+    if not (checkout / ".git").exists():  # otherwise git would answer for an enclosing repository
         return {}
     environment = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
     try:

@@ -25,16 +25,16 @@ from robot_io.rig.config import rig_from_toml
 from robot_io.ur10.driver import ArmLink
 from tools.kinds import name_of
 from tools.run.jobs import ControlJob
-from tools.run.run_state import first_state, status_line
+from tools.run.run_state import initial_state, status_line
 from tools.run.tick_core import TickCore
 
 PRIORITY = 80
 VERDICT_WITHIN_S = 60.0
-"""The base stands already; this long a launcher that is held up (a stopped terminal) may take to listen again."""
+"""How long a blocked launcher (a stopped terminal) may take to read the result; the base is already at rest."""
 
 
 class DriverWarnings(logging.Handler):
-    """Passes on what the sensor's driver warns of (a USB adapter that delivers late): nobody sees our stderr."""
+    """Forwards the sensor driver's warnings to the launcher (a late USB adapter): nobody sees our stderr."""
 
     def __init__(self, status: StatusPipe, name: str) -> None:
         super().__init__(logging.WARNING)
@@ -42,12 +42,12 @@ class DriverWarnings(logging.Handler):
         self._name = name
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say it to the launcher."""
+        """Send the warning to the launcher."""
         self._status.say("warning", text=f"{self._name}: {record.getMessage()}")
 
 
 def main() -> int:
-    """Run the loop to its end; the exit code is the run's."""
+    """Run the loop to its end; return the exit code of the run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=ControlJob)
     die_with_parent(job.launcher_pid)
@@ -66,7 +66,7 @@ def main() -> int:
     watch = Watch(gate=job.gate_pidfd, arm=job.arm_pidfd, recorder=job.recorder_pidfd)
     loop = ControlLoop(
         core.fold,
-        first_state(job.saved_tare),
+        initial_state(job.saved_tare),
         rate_hz=rig.loop.rate_hz,
         sensor_rate_hz=rig.ft.declared.rate_hz,
         sensor=sensor,
@@ -85,7 +85,7 @@ def main() -> int:
         sensor.close()
         status.error(error)
         return error.exit_code
-    except SystemExit:  # told to end meanwhile: a stream that has begun is not left running
+    except SystemExit:  # SIGTERM during the start: a stream that has begun is not left running
         sensor.close()
         raise
     status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
@@ -99,13 +99,13 @@ def main() -> int:
     gc.disable()
     lock_memory()
     loop.run()
-    base.close()  # first of all: the gate takes the EOF for the end and sends its last zeros
+    base.close()  # first: the gate reads the EOF as the end and sends its last zeros
     gc.enable()
     return _finish(loop, sensor, status, rig.loop.rate_hz)
 
 
 def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
-    """Wait until the launcher says that every device is ready; keep the sensor drained meanwhile."""
+    """Return whether the launcher lets the loop start; keep the sensor drained while waiting."""
     os.set_blocking(operator_fd, False)
     while True:
         readable, _, _ = select.select([operator_fd], [], [], 0.05)

@@ -1,7 +1,7 @@
 """The emulators of a run, in one process: `python -m tools.run.emulator_process` (job on stdin).
 
-World and wire servers share one thread and one epoll. When the run ends, or its launcher dies, they serve on for
-a moment, so that the wheels are seen to come to rest and the log holds it.
+World and wire servers share one thread and one epoll. When the run ends, or its launcher dies, they keep serving
+for a moment, so that the log shows the wheels coming to rest.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ REST_NS = 100 * NS_PER_MS
 WATCH_NS = 20 * NS_PER_MS
 
 
-class Ending:
-    """Ends the loop a moment after SIGTERM: when the base has come to rest, at most after LINGER_NS."""
+class StopAtRest:
+    """Stops the loop after SIGTERM: when the base has come to rest, or after LINGER_NS at the latest."""
 
     def __init__(self, loop: EventLoop, world: World) -> None:
         self._loop = loop
@@ -41,12 +41,12 @@ class Ending:
         self._since_ns = 0
         self._rest_ns = 0
         signal.signal(signal.SIGTERM, self._ask)
-        loop.call_every(WATCH_NS, self._look)
+        loop.call_every(WATCH_NS, self._check)
 
     def _ask(self, *_: object) -> None:
         self._asked = True
 
-    def _look(self, _deadline_ns: int) -> None:
+    def _check(self, _deadline_ns: int) -> None:
         now_ns = monotonic_ns()
         self._world.advance_to(now_ns)
         if not self._asked:
@@ -60,7 +60,7 @@ class Ending:
 
 
 def main() -> int:
-    """Serve until SIGTERM."""
+    """Serve until SIGTERM; return the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=EmulatorJob)
     die_with_parent(job.launcher_pid, signal.SIGTERM)
@@ -79,7 +79,7 @@ def main() -> int:
             emulator.close()
         status.error(error)
         return error.exit_code
-    Ending(loop, world)
+    StopAtRest(loop, world)
     status.say(
         "ready",
         addresses={device: address_of(emulator) for device, emulator in opened.items()},

@@ -1,4 +1,4 @@
-"""Opens wire emulators on one world: used by a run's emulator process and by `push emulate all`."""
+"""Open wire emulators on one world; used by a run's emulator process and by `push emulate all`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sim_backend.world.world import World
 from tools.rig import kinds_of
 
 ARM_HOSTS = tuple(f"127.0.0.{last}" for last in range(10, 250))
-"""A UR10's ports are fixed, so each emulated arm needs a loopback address of its own."""
+"""A UR10's ports are fixed, so each emulated arm needs its own loopback address."""
 
 
 class Emulator(Protocol):
@@ -43,7 +43,7 @@ def open_ft300(loop: EventLoop, world: World, rig: RigConfig) -> Ft300Emulator:
 
 
 def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, ...] = ARM_HOSTS) -> UrEmulator:
-    """Open a UR10 on the first loopback address whose ports are free. Raises EnvironmentFault when none is."""
+    """Open a UR10 on the first loopback address whose ports are free. Raises EnvironmentFault if none is."""
     for host in hosts:
         try:
             return UrEmulator(loop, world, host=host, rate_hz=rig.world.arm_rate_hz, phase=rig.world.arm_phase)
@@ -59,7 +59,7 @@ def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, .
 def open_ridgeback(
     loop: EventLoop, world: World, rig: RigConfig, host: str = "127.0.0.1", port: int = 0
 ) -> RosbridgeEmulator:
-    """Open a rosbridge with a Ridgeback behind it; port 0 takes a free one."""
+    """Open a rosbridge server with a Ridgeback behind it; port 0 picks a free port."""
     return RosbridgeEmulator(loop, world, host=host, port=port, settings=ridgeback_settings(rig))
 
 
@@ -68,11 +68,11 @@ OPENERS: dict[str, Callable[[EventLoop, World, RigConfig], Emulator]] = {
     "ur": open_ur10,
     "ridgeback-rosbridge": open_ridgeback,
 }
-"""How the emulator of each shipped kind is opened."""
+"""The function that opens the emulator of each shipped kind."""
 
 
-class OwnEmulator:
-    """The emulator that a kind outside this project names: its `tick(now_ns)` is called every `period_s`."""
+class ExternalEmulator:
+    """The emulator of an external kind: its `tick(now_ns)` is called every `period_s`."""
 
     def __init__(self, loop: EventLoop, emulator: Any) -> None:
         self._emulator = emulator
@@ -80,7 +80,7 @@ class OwnEmulator:
 
     @property
     def address(self) -> str:
-        """Where its driver finds it."""
+        """The address for its driver."""
         return str(self._emulator.address)
 
     @property
@@ -97,27 +97,27 @@ class OwnEmulator:
 def open_emulator(loop: EventLoop, world: World, rig: RigConfig, device: str, folder: str) -> Emulator:
     """Open the emulator of the rig's ft, arm or base. Raises ConfigError and EnvironmentFault.
 
-    folder: where else the module of its kind may be.
+    folder: another place to look for the module of its kind.
     """
     kind = kinds_of(rig)[device]
     if kind in OPENERS:
         return OPENERS[kind](loop, world, rig)
     options = {"ft": rig.ft.options, "arm": rig.arm.options, "base": rig.base.options}[device]
-    return OwnEmulator(loop, find_kind(device, kind, folder).Emulator(world, options))
+    return ExternalEmulator(loop, find_kind(device, kind, folder).Emulator(world, options))
 
 
 def endpoint(emulator: Emulator) -> dict[str, str]:
-    """Return where an emulator can be reached, as `push emulate` says it: its `port`, `host` or `url`."""
+    """Return where an emulator can be reached, as `push emulate` prints it: its `port`, `host` or `url`."""
     if isinstance(emulator, Ft300Emulator):
         return {"device": "ft300", "port": emulator.port}
     if isinstance(emulator, UrEmulator):
         return {"device": "ur10", "host": emulator.host}
-    if isinstance(emulator, OwnEmulator):
+    if isinstance(emulator, ExternalEmulator):
         return {"device": "own", "address": emulator.address}
     assert isinstance(emulator, RosbridgeEmulator)
     return {"device": "ridgeback", "url": emulator.url}
 
 
 def address_of(emulator: Emulator) -> str:
-    """Return what the emulator's driver takes as its address."""
+    """Return the address that the emulator's driver connects to."""
     return next(value for name, value in endpoint(emulator).items() if name != "device")

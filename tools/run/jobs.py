@@ -1,4 +1,4 @@
-"""What the launcher hands to each process of a run: one JSON object on stdin, descriptors inherited."""
+"""The jobs of a run's processes: one JSON object each on stdin, descriptors inherited."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from tools.places.saved_tare import SavedTare
 
 
 class ControlJob(msgspec.Struct, frozen=True):
-    """For `tools.run.control_process`."""
+    """Job of `tools.run.control_process`."""
 
     rig_toml: str
     kind_folder: str
-    """Where else the module of the sensor's kind may be."""
+    """Another place to look for the module of the sensor's kind."""
     saved_tare: SavedTare | None
     launcher_pid: int
     gate_fd: int
@@ -27,7 +27,7 @@ class ControlJob(msgspec.Struct, frozen=True):
 
 
 class ArmKindJob(msgspec.Struct, frozen=True):
-    """For `tools.run.arm_process`."""
+    """Job of `tools.run.arm_process`."""
 
     rig_toml: str
     kind_folder: str
@@ -37,13 +37,13 @@ class ArmKindJob(msgspec.Struct, frozen=True):
 
 
 class EmulatorJob(msgspec.Struct, frozen=True):
-    """For `tools.run.emulator_process`."""
+    """Job of `tools.run.emulator_process`."""
 
     rig_toml: str
     kind_folder: str
     seed: int
     devices: tuple[str, ...]
-    """Which of ft, arm and base are emulated."""
+    """The emulated devices: any of ft, arm and base."""
     launcher_pid: int
     ring_fd: int
     status_fd: int

@@ -1,13 +1,13 @@
-"""A wall-clock run: starts the processes, watches them, owns terminal and signals, and tells how it ended.
+"""A wall-clock run: starts and watches the processes, owns terminal and signals, and reports how it ended.
 
     emulators   one process with the world and its wire servers (emulated devices only)
-    recorder    drains the log rings into run.mcap, finishes it when control is gone
+    recorder    drains the log rings into run.mcap, finishes it when control has ended
     gate        sole holder of the base connection
-    arm         the ur_rtde wheel, publishing a shared record
-    control     the loop: sensor in, law, supervisor, envelope, one frame to the gate a tick
+    arm         the ur_rtde library, publishing a shared record
+    control     the loop: sensor, law, supervisor, envelope, one frame to the gate per tick
 
-How they are wired: `processes`. The launcher itself has no device and no real-time duty: a blocked terminal never
-touches a tick.
+How they are connected: `processes`. The launcher itself has no device and no real-time work: a blocked terminal
+never delays a tick.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from robot_io.rig.config import RigConfig
 from safety.gate import Latch
 from tools.kinds import name_of
 from tools.places import run_dir
+from tools.places.atomic_file import write_json
 from tools.places.saved_tare import SavedTare
-from tools.places.whole_file import write_json
-from tools.run.aftermath import figures_of
+from tools.run.figures_from_log import figures_from_log
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
-from tools.terminal.start_errors import combined, not_in_time
+from tools.terminal.start_errors import combined_error, start_timeout
 
 PRIORITY = 1
-"""Below all others of the run. Not for its work: a process that is killed needs the processor to die, and the base is
-stopped by this one's death."""
+"""Below all other processes of the run. Not for its work: a killed process needs processor time to die, and the
+death of this one stops the base."""
 EMULATORS_READY_NS = 20 * NS_PER_S
 READY_NS = 20 * NS_PER_S
-"""Each device has its own, shorter deadline; these only catch a process that hangs before it."""
-OTHERS_NS = 4 * NS_PER_S
-"""After the first device failed, the others may still say what is wrong with them."""
+"""Each device has its own, shorter deadline; these only catch a process that hangs before that."""
+OTHER_FAILURES_NS = 4 * NS_PER_S
+"""After the first device failed, the others may still report their own errors for this long."""
 FROZEN_NS = NS_PER_S
-"""The gate has latched and control has not spoken for this long: it is frozen, and is killed."""
-FIRST_WORD_NS = 5 * NS_PER_S
-"""Control was let go and its loop has said nothing for this long: it froze before the gate could know it by silence."""
-AGAIN_NS = NS_PER_S
-"""A second stop counts from here on; before, it is the same one (`timeout` and shells signal twice)."""
+"""If the gate has latched and control has sent no status for this long, it is frozen and is killed."""
+FIRST_STATUS_NS = 5 * NS_PER_S
+"""If control has sent no status this long after its start, it froze before the gate could detect it."""
+SECOND_STOP_NS = NS_PER_S
+"""A second stop counts only this long after the first: `timeout` and shells may send one stop twice."""
 ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0}
-"""In this order."""
+"""Processes in the order in which they end."""
 
 
 class Launcher:
-    """One run at level emulated, hardware or a mix; `run` returns the figures of its end, `notes` what else to say."""
+    """One run at level emulated, hardware or a mix; `run` returns its final figures, `notes` holds further remarks."""
 
     def __init__(
         self, rig: RigConfig, out: Path, *, seed: int, saved: SavedTare | None, live: LiveLine, kind_folder: str
@@ -74,7 +74,7 @@ class Launcher:
         self._status_ns = 0
 
     def run(self) -> dict[str, Any]:
-        """Run to the end. Raises PushError when it never began, or when nothing can be said of its end."""
+        """Run to the end; return the figures. Raises PushError if the run did not start or its result is unknown."""
         keys = OperatorKeys(self._loop, self._stop, self._resume)
         try:
             try:
@@ -84,7 +84,7 @@ class Launcher:
                 self._end()
                 keys.close()
                 self._loop.close()
-            self._note_the_others()
+            self._note_process_failures()
             return self._figures()
         finally:
             for child in self._children.values():
@@ -92,30 +92,30 @@ class Launcher:
 
     @property
     def began(self) -> bool:
-        """Return whether every device was ready and the loop was let go."""
+        """Return whether every device was ready and the loop was started."""
         return self._began
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
-        """Return the counters of the three devices, as their drivers counted."""
+        """Return the counters of the three drivers, by device name."""
         return {
             name_of(self._rig.ft.kind): figures["ft"],
             name_of(self._rig.arm.kind): {"packets": figures["arm_packets"]},
-            name_of(self._rig.base.kind): self._said("gate").get("counters", {}),
+            name_of(self._rig.base.kind): self._finished_event("gate").get("counters", {}),
         }
 
     # --- start -----------------------------------------------------------------------------------------------
 
     def _start(self) -> None:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)
-        names = self._processes.start_the_rest(run_dir.write_config(self._out, self._rig))
+        names = self._processes.start_remaining(run_dir.write_config(self._out, self._rig))
         pids = {"schema": 1, "launcher": os.getpid(), **self._processes.pids}
         write_json(self._out / "processes.json", pids)
         self._wait_ready(names, READY_NS)
-        self._tell_priorities()
+        self._warn_without_realtime()
         self._began = True
-        self._processes.tell_control(b"G")
+        self._processes.send_to_control(b"G")
 
-    def _tell_priorities(self) -> None:
+    def _warn_without_realtime(self) -> None:
         plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
         if plain:
             self._live.say(f"no permission for real-time priority for {', '.join(plain)}: only 100 Hz is supported")
@@ -135,12 +135,12 @@ class Launcher:
                 self._live.say(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
                 self._live.say(f"recorder: {event['error']['what']}")
-                self._processes.tell_control(b"L")
+                self._processes.send_to_control(b"L")
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
 
     def _wait_ready(self, names: list[str], within_ns: int) -> None:
-        """Wait until all are ready. Raises PushError with everything that failed, each with what to do."""
+        """Wait until all are ready. Raises PushError naming everything that failed and what to do about each."""
         deadline_ns = monotonic_ns() + within_ns
         while True:
             waiting = [self._children[name] for name in names if self._children[name].ready is None]
@@ -150,16 +150,16 @@ class Launcher:
                 raise OperatorStop("stopped before the start")
             failed = [child for child in waiting if self._failed(child)]
             if failed:
-                deadline_ns = min(deadline_ns, monotonic_ns() + OTHERS_NS)
-            # Control opens the sensor, the gate the base, the arm's process the arm: all three may still speak.
+                deadline_ns = min(deadline_ns, monotonic_ns() + OTHER_FAILURES_NS)
+            # Control opens the sensor, the gate the base, the arm's process the arm: all three may still report.
             if failed and (len(failed) == len(waiting) or monotonic_ns() > deadline_ns):
-                raise combined(failed, self._rig)
+                raise combined_error(failed, self._rig)
             if monotonic_ns() > deadline_ns:
-                raise not_in_time(waiting, self._rig)
+                raise start_timeout(waiting, self._rig)
             self._loop.run_once(20)
 
     def _failed(self, child: Child) -> bool:
-        ended = child.process.poll() is not None  # asked first: all it said is in the pipe by then
+        ended = child.process.poll() is not None  # checked first: all its output is in the pipe by then
         if child.status.open:
             self._hear(child)
         return bool(child.errors) or (ended and child.ready is None)
@@ -167,16 +167,16 @@ class Launcher:
     # --- watch -----------------------------------------------------------------------------------------------
 
     def _watch(self) -> None:
-        """Wait for control's end."""
+        """Wait until control has ended."""
         control = self._children["control"]
         went_ns = monotonic_ns()
         try_realtime(PRIORITY)
         try:
             while control.process.poll() is None:
                 self._loop.run_once(50)
-                allowed_ns = FROZEN_NS if self._gate_latch else FIRST_WORD_NS if not self._status_ns else None
+                allowed_ns = FROZEN_NS if self._gate_latch else FIRST_STATUS_NS if not self._status_ns else None
                 if allowed_ns and monotonic_ns() - (self._status_ns or went_ns) > allowed_ns:
-                    control.process.kill()  # the base has its zeros; a frozen control would only hide the end
+                    control.process.kill()  # the base has its zeros; a frozen control would only delay the end
         finally:
             leave_realtime()
         self._hear(control)
@@ -187,20 +187,24 @@ class Launcher:
         if not self._stop_asked_ns:
             self._stop_asked_ns = now_ns
             self._live.say("stopping ...")
-            self._processes.tell_control(b"S")
-        elif now_ns - self._stop_asked_ns > AGAIN_NS and "control" in self._children and not self._killed_by_operator:
+            self._processes.send_to_control(b"S")
+        elif (
+            now_ns - self._stop_asked_ns > SECOND_STOP_NS
+            and "control" in self._children
+            and not self._killed_by_operator
+        ):
             self._killed_by_operator = True
             self._live.say("stopping at once")
             self._children["control"].process.kill()
 
     def _resume(self) -> None:
-        if self._began:  # before, anything but the word to go would end control
-            self._processes.tell_control(b"R")
+        if self._began:  # before the start, any byte but G would end control
+            self._processes.send_to_control(b"R")
 
     # --- end -------------------------------------------------------------------------------------------------
 
     def _end(self) -> None:
-        """End every process; the gate ends by control's EOF, the recorder by that of all, the others are told to."""
+        """End all: the gate by control's EOF, the recorder by that of all producers, the others by SIGTERM."""
         self._processes.hang_up()
         control = self._children.get("control")
         if control is not None and control.ready is None:
@@ -213,30 +217,30 @@ class Launcher:
                 child.terminate()
             child.end(within_s)
             if name == "control" and "arm" in self._children:
-                self._children["arm"].terminate()  # before the robot it would miss
+                self._children["arm"].terminate()  # before the emulated robot that it would miss
             if child.status.open:
                 child.hear()
             self._loop.remove_fd(child.status.fd)
 
-    def _said(self, name: str) -> dict[str, Any]:
+    def _finished_event(self, name: str) -> dict[str, Any]:
         return self._children[name].finished or {}
 
-    def _note_the_others(self) -> None:
-        """Note what went wrong in the processes beside control."""
+    def _note_process_failures(self) -> None:
+        """Note what went wrong in the processes other than control."""
         for name in ("gate", "emulators", "arm", "recorder"):
             child = self._children.get(name)
             if child is not None and child.errors:
                 self.notes.append(f"{name}: {child.errors[-1].what}")
             elif child is not None and child.process.returncode != 0:
                 self.notes.append(f"the {name} process {child.how_it_ended()}")
-        said = self._said("recorder")
-        if not said.get("complete", False):
-            self.notes.append("the log is not complete: `push log recover` may save it")
-        if dropped := sum(said.get("dropped", {}).values()):
+        recorded = self._finished_event("recorder")
+        if not recorded.get("complete", False):
+            self.notes.append("the log is not complete: `push log recover` may repair it")
+        if dropped := sum(recorded.get("dropped", {}).values()):
             self.notes.append(f"{dropped} records did not fit into the log's ring buffers")
 
     def _figures(self) -> dict[str, Any]:
-        """Return control's figures, or those of the log when control cannot say them any more."""
+        """Return control's figures, or those from the log if control could not report them."""
         control = self._children["control"]
         if control.finished is not None:
             figures: dict[str, Any] = control.finished
@@ -251,8 +255,8 @@ class Launcher:
             code, how = control.process.returncode, f"{control.how_it_ended()}, see {control.save_stderr()}"
         stopped = f"the control process {how}; the gate stopped the base"
         try:
-            figures = figures_of(self.log, self._rig.loop.rate_hz, code)
+            figures = figures_from_log(self.log, self._rig.loop.rate_hz, code)
         except PushError as unreadable:
-            raise SafetyStop(stopped, where="control", do=f"Its log holds nothing more ({unreadable.what})") from None
+            raise SafetyStop(stopped, where="control", do=f"Its log does not say more ({unreadable.what})") from None
         self.notes.append(stopped)
         return figures

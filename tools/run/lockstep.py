@@ -1,4 +1,4 @@
-"""Level `sim`: three simulated devices, one process, one thread, a virtual clock; same core, same gate, same log.
+"""Level `sim`: three simulated devices on a virtual clock, in one process and thread; same core, gate and log.
 
 Two runs with the same rig and seed give identical files: log times start at a fixed epoch.
 """
@@ -33,28 +33,28 @@ from tools.log.run_log import RunLog
 from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
 from tools.run.run_facts import run_facts
-from tools.run.run_state import first_state
+from tools.run.run_state import initial_state
 from tools.run.tick_core import TickCore, tick_message
 
 START_NS = NS_PER_S
 """Virtual time of the first tick."""
-MOST_SECONDS = 4 * 3600.0
+MAX_SIMULATED_S = 4 * 3600.0
 
 
 class LockstepLog(Protocol):
-    """What takes the records of a lockstep run: a `RunLog`, or nothing at all in a sweep."""
+    """Receives the records of a lockstep run: a `RunLog`, or a sweep's log that keeps nothing."""
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
-        """Take one ring record."""
+        """Receive one ring record."""
         ...
 
     def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
-        """Take one tick, encoded and as it is."""
+        """Receive one tick, encoded and decoded."""
         ...
 
 
 class Lockstep:
-    """One push in lockstep. `log` gets each record as the rings would; `run` returns the figures of the end."""
+    """One push in lockstep. `log` receives each record as the rings would; `run` returns the final figures."""
 
     def __init__(
         self,
@@ -77,14 +77,14 @@ class Lockstep:
             self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
         )
         self._core = TickCore.of(rig, in_contact=saved is not None)
-        self._state = first_state(saved)
+        self._state = initial_state(saved)
         self._gate = GateShell(self._core.safety.envelope, START_NS)
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
         self.notes = RunNotes()
         self.operator = Operator.NONE
 
     def run(self, on_tick: Callable[[TickInput, TickState, TickOutput], None]) -> dict[str, Any]:
-        """Run to the end; `on_tick` is called after each tick (to pace and to show)."""
+        """Run to the end and return the figures; `on_tick` is called after each tick (to pace and to display)."""
         devices = (self._ft, self._arm, self._base)
         for device in devices:
             device.open()
@@ -95,7 +95,7 @@ class Lockstep:
             self._clock.advance_to(now_ns)
             inp, output = self._tick(tick, now_ns)
             on_tick(inp, self._state, output)
-            if output.finished or now_ns > MOST_SECONDS * NS_PER_S:
+            if output.finished or now_ns > MAX_SIMULATED_S * NS_PER_S:
                 break
             tick += 1
         counters = {
@@ -129,14 +129,14 @@ class Lockstep:
         )
         try:
             after, output = self._core.fold(self._state, inp)
-        except Exception:  # as in the loop: the base gets zero and the log says so; the error is for whoever runs this
+        except Exception:  # as in the loop: the base gets zero and the log says so; the caller gets the error
             failed = replace(inp, host=replace(inp.host, loop_error=True))
-            self._conclude(failed, *self._core.fold(self._state, failed))
+            self._finish_tick(failed, *self._core.fold(self._state, failed))
             raise
-        self._conclude(inp, after, output)
+        self._finish_tick(inp, after, output)
         return inp, output
 
-    def _conclude(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
+    def _finish_tick(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
         self._send(inp.tick, inp.now_ns, output)
         message = tick_message(inp, self._state, after, output)
         self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
@@ -144,7 +144,7 @@ class Lockstep:
         self.notes.note(inp, output)
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
-        """Pass the command through the gate, as its process does."""
+        """Pass the command through the gate, as the gate process does."""
         frame = GateFrame(self._gate.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
         self._gate = self._gate.on_frames((frame,), now_ns, now_ns).on_clock(now_ns, self._base.health())
         self._gate, latching = self._gate.on_leaving(now_ns)
@@ -160,24 +160,24 @@ class Lockstep:
         samples = self._base.drain()
         for sample in samples:
             self._gate_log.inbound(sample)
-        # Nothing is pinged here: there is no bridge that could answer.
+        # No pings here: there is no bridge that could answer.
         self._gate = self._gate.on_samples(samples).on_publish(
             now_ns, newest_inbound_ns=self._base.newest_inbound_ns, newest_pong_ns=0
         )
 
 
 def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
-    """Open the log of a lockstep run; its facts name nothing that differs from run to run."""
+    """Open the log of a lockstep run; its facts hold nothing that differs from run to run."""
     facts = run_facts("sim", seed, in_contact=in_contact)
     return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
 
 
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:
-    """Return the sensor of level sim: an FT 300, or any other kind by what it declares."""
+    """Return the sensor of level sim: an FT 300, or any other kind as it declares itself."""
     model, facts = rig.world.sensor, rig.ft.declared
     if is_shipped("ft", rig.ft.kind):
         return SimFt300(world, clock, rate_hz=model.rate_hz, phase=model.phase, latency_ms=model.latency_ms)
-    # Never exactly a multiple of the loop's rate, or every run would test one frozen phase.
+    # Never an exact multiple of the loop's rate, or every run would test one fixed phase.
     rate_hz = facts.rate_hz * model.rate_hz / FT300_FACTS.rate_hz
     return SimFt300(
         world, clock, rate_hz=rate_hz, phase=model.phase, latency_ms=0, resolution=facts.resolution, limit=facts.range
@@ -192,13 +192,13 @@ class WallPace:
         self._next_s = time.monotonic()
 
     def wait(self) -> None:
-        """Wait for the next tick's time; a late tick is not caught up in a burst."""
+        """Wait for the next tick's time; late ticks are not caught up in a burst."""
         self._next_s = max(self._next_s + self._period_s, time.monotonic())
         time.sleep(max(0.0, self._next_s - time.monotonic()))
 
 
 def stop_on_signals(run: Lockstep) -> None:
-    """Make SIGINT, SIGTERM and SIGHUP the operator's stop."""
+    """Make SIGINT, SIGTERM and SIGHUP act as the operator's stop."""
 
     def ask(*_: object) -> None:
         run.operator = Operator.STOP

@@ -2,15 +2,15 @@
 
     what               from -> to                                    kind
     log rings          control, gate, emulators -> recorder          memfd, one each
-    alive pipes        control, gate, emulators -> recorder          nothing is written: EOF says that it is gone
-    gate link          control <-> gate                              SEQPACKET; EOF says that control is gone
+    alive pipes        control, gate, emulators -> recorder          nothing is written: EOF means it has ended
+    gate link          control <-> gate                              SEQPACKET; EOF means control has ended
     records            gate -> control, arm -> control               memfd, newest wins
-    pidfds             gate, arm, recorder -> control                readable when the process is gone
-    operator pipe      launcher -> control                           one byte each: go, stop, resume
+    pidfds             gate, arm, recorder -> control                readable when the process has ended
+    operator pipe      launcher -> control                           one byte each: go, stop, resume, log failed
     status pipes       each of them -> launcher                      JSON lines
 
-Every copy of an inherited end that stayed open in the launcher would hide the end of the process that holds it, so
-all are closed here as soon as the last process has its own.
+A copy of an inherited descriptor left open in the launcher would hide the end of the process that holds it, so all
+are closed here as soon as the last process has its own.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ from tools.run.recorder import RingSource
 from tools.run.run_facts import level_of, run_facts
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
-"""Room for about two minutes of a recorder that does not drain."""
+"""Room for about two minutes without a drain by the recorder."""
 
 
 class Processes:
-    """Starts the processes of one run, by `start_emulators` and `start_the_rest`; `children` has them by name.
+    """Starts the processes of one run, by `start_emulators` and `start_remaining`; `children` has them by name.
 
     saved: the tare of a run that starts in contact. log: where the recorder writes.
-    kind_folder: where else modules of the rig's kinds may be. on_spawn: called with each
-    child as soon as it is there.
+    kind_folder: another place to look for modules of the rig's kinds. on_spawn: called
+    with each child as soon as it has been started.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Processes:
         self._spawn("emulators", "tools.run.emulator_process", job, [ring_fd, alive_fd])
         return ["emulators"]
 
-    def start_the_rest(self, config_text: str) -> list[str]:
+    def start_remaining(self, config_text: str) -> list[str]:
         """Start recorder, gate, arm and control, once the emulators are ready; return their names.
 
         config_text: the resolved rig, for the log.
@@ -118,14 +118,14 @@ class Processes:
         base.close()
         return ["recorder", "gate", "arm", "control"]
 
-    def tell_control(self, key: bytes) -> None:
-        """Pass G (go), S (stop) or R (resume) on; nothing happens when control is not there to hear it."""
+    def send_to_control(self, key: bytes) -> None:
+        """Send G (go), S (stop), R (resume) or L (log failed) to control; ignored if control is not running."""
         if self._operator_fd >= 0:
             with contextlib.suppress(OSError):
                 os.write(self._operator_fd, key)
 
     def hang_up(self) -> None:
-        """Close the operator pipe, which control takes for a stop; idempotent."""
+        """Close the operator pipe, which control treats as a stop; idempotent."""
         if self._operator_fd >= 0:
             os.close(self._operator_fd)
             self._operator_fd = -1
@@ -138,7 +138,7 @@ class Processes:
         self._on_spawn(child)
 
     def _with_endpoints(self) -> RigConfig:
-        """Return the rig with the addresses of its emulators in it."""
+        """Return the rig with the addresses of its emulators filled in."""
         rig = self._rig
         emulators = self.children.get("emulators")
         ready = (emulators.ready if emulators else None) or {}
@@ -177,7 +177,7 @@ class Processes:
 
     def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:
         ring_fd, alive_fd = self._rings["control"].fd, self._alive["control"][1]
-        # Opened here, where a process that has ended already can still be opened: nobody has waited for it yet.
+        # Opened here, where even a process that has ended can still be opened: it has not been waited for yet.
         pidfds = [os.pidfd_open(self.children[name].pid) for name in ("gate", "arm", "recorder")]
         job = ControlJob(
             rig_to_toml(rig),

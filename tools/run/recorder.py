@@ -1,4 +1,4 @@
-"""The recorder process: drains the rings of a run into its log, and finishes the log when control is gone.
+"""The recorder process: drains the rings of a run into its log and finishes the log when control has ended.
 
     python -m tools.run.recorder  < one line of JSON: {
         "out_path": "DIR/run.mcap", "config_text": "...", "metadata": {"seed": "0"}, "wall_offset_ns": N,
@@ -6,11 +6,12 @@
         "alive_fds": [8, 9, 10], "status_fd": 11}
 
 `alive_fds` are read ends of pipes, one for each ring and in the same order; only the producer holds the write end, so
-that EOF means it is gone. The first is control's: its end is the end of the run. The others then have 1.5 s.
+EOF means it has ended. The first is control's: its EOF ends the run. The others then have 1.5 s to end.
 
-It has no other way to be told to stop: SIGINT, SIGTERM and SIGHUP are ignored, because whoever sends them to a
-process group would cut the log. On `status_fd` it says "ready", "error" and "finished" (`robot_io.ipc.status`).
-When the disk fails it says so, keeps draining, so that no producer notices, and counts what was lost; exit code 1.
+There is no other way to stop it: SIGINT, SIGTERM and SIGHUP are ignored, because a signal to the process group
+would truncate the log. On `status_fd` it reports "ready", "error" and "finished" (`robot_io.ipc.status`).
+If the disk fails, it reports the error, keeps draining so that no producer blocks, and counts the lost records; exit
+code 1.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ POLL_NS = 20 * NS_PER_MS
 FLUSH_NS = 250 * NS_PER_MS
 OTHERS_MAX_NS = 1500 * NS_PER_MS
 FINAL_DRAIN_MAX_NS = 5000 * NS_PER_MS
-"""Against a producer that is still there and pushes faster than the disk takes it."""
+"""Limit for a producer that is still running and pushes faster than the disk can write."""
 _BATCH = 1000
 
 
@@ -46,7 +47,7 @@ class RingSource(msgspec.Struct, frozen=True):
 
 
 class Job(msgspec.Struct, frozen=True):
-    """What to record; see the module's own text."""
+    """What to record; see the module docstring."""
 
     out_path: str
     config_text: str
@@ -58,7 +59,7 @@ class Job(msgspec.Struct, frozen=True):
 
 
 class Recorder:
-    """Drains rings into one log until every producer is gone."""
+    """Drains rings into one log until every producer has ended."""
 
     def __init__(self, job: Job, status: StatusPipe) -> None:
         self._job = job
@@ -86,7 +87,7 @@ class Recorder:
         self._status.say("ready", path=self._job.out_path)
         self._loop.run()
         until_ns = monotonic_ns() + FINAL_DRAIN_MAX_NS
-        while self._drain() and monotonic_ns() < until_ns:  # what came while the last producer went
+        while self._drain() and monotonic_ns() < until_ns:  # records pushed while the last producer ended
             continue
         self._finish()
         self._loop.close()
@@ -111,7 +112,7 @@ class Recorder:
             self._loop.stop()
 
     def _drain(self) -> bool:
-        """Write what is in the rings, a bounded part at a time; tell whether there was anything."""
+        """Write what is in the rings, a bounded part at a time; return whether there was anything."""
         found = False
         for name, ring in self._rings.items():
             try:
@@ -145,7 +146,7 @@ class Recorder:
         self._disk_failed = True
         self._log.abandon()
         what = f"the log cannot be written any more: {error.strerror}"
-        self._status.error(EnvironmentFault(what, where=self._job.out_path, do="Make room on that disk"))
+        self._status.error(EnvironmentFault(what, where=self._job.out_path, do="Free some space on that disk"))
 
     def _finish(self) -> None:
         dropped = {name: ring.dropped for name, ring in self._rings.items()}

@@ -1,4 +1,4 @@
-"""Facts of a run that go into its log: code, machine, level, seed."""
+"""Facts about a run that are written into its log: code, machine, level, seed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tools.run.code_facts import code_facts
 
 
 def code_and_machine() -> dict[str, str]:
-    """Return what can make a replay differ: format, program, packages, Python, C library, processor."""
+    """Return the facts that can make a replay differ: format, program, packages, Python, C library, processor."""
     return {
         **code_facts(),
         "python": platform.python_version(),

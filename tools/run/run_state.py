@@ -1,4 +1,4 @@
-"""Where a run starts, and the figures of its live line."""
+"""The initial state of a run, and the figures of its live line."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, Tick
 from tools.places.saved_tare import SavedTare
 
 
-def first_state(saved: SavedTare | None) -> TickState:
-    """Return the state a run begins with: untared, or with a tare saved earlier, valid at the joints it holds."""
+def initial_state(saved: SavedTare | None) -> TickState:
+    """Return the state a run starts with: untared, or with a saved tare, valid at the joint positions saved with it."""
     if saved is None:
         return TickState()
     bias = saved.bias

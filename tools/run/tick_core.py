@@ -1,4 +1,4 @@
-"""The pure core of a tick, composed: step -> supervise -> envelope. Run by the loop, by level `sim`, by replay."""
+"""The pure core of a tick: step -> supervise -> envelope. Run by the loop, by level `sim` and by replay."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from safety.supervisor import give_up, note_command, supervise
 
 
 class TickCore(msgspec.Struct, frozen=True):
-    """Settings of control and safety; `fold` runs one tick."""
+    """The settings of control and safety; `fold` runs one tick."""
 
     control: Settings
     safety: SafetySettings
@@ -28,8 +28,8 @@ class TickCore(msgspec.Struct, frozen=True):
         return cls(Settings.of(rig, in_contact=in_contact), SafetySettings.of(rig))
 
     def fold(self, state: TickState, inp: TickInput) -> tuple[TickState, TickOutput]:
-        """Return the state after this tick and what it says. Pure: same arguments, same result, bit for bit."""
-        if inp.host.loop_error:  # this tick has already failed once: nothing of it is computed again
+        """Return the state after this tick and its output. Pure: same arguments, same result, bit for bit."""
+        if inp.host.loop_error:  # this tick has already failed once: none of it is computed again
             dead, verdict = give_up(state.safety, inp)
             still = EnvelopeState(BodyTwist(), state.envelope.clamps, False)
             return TickState(state.control, dead, still), TickOutput(

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from robot_io.errors import UsageError
-from tools.places.whole_file import check_writable, write_json, write_whole
+from tools.places.atomic_file import check_writable, write_atomically, write_json
 from tools.study.items import Part, Row
 
 STUDY_FILE = "study.json"
@@ -96,7 +96,7 @@ class Store:
 
     def write_bytes(self, name: str, content: bytes) -> None:
         """Write a file atomically."""
-        write_whole(self.out / name, content)
+        write_atomically(self.out / name, content)
 
     def _read(self, index: int) -> Part | None:
         path = self.out / "parts" / f"{index:06d}.npz"

@@ -1,1 +1,1 @@
-"""What a run shows in the terminal and hears from it."""
+"""A run's output to the terminal and input from it."""

@@ -1,4 +1,4 @@
-"""What `push run` says about gains that leave little room, for the sliders its rig assumes."""
+"""The warning of `push run` about gains with little stability margin for the sliders its rig assumes."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tools.rig import devices_at
 
 
 def gain_warning(rig: RigConfig) -> str | None:
-    """Return one sentence if a rig's gains are beyond 0.7 of the limit for a slider it may meet, else None.
+    """Return a warning if a rig's gains exceed 0.7 of the limit for a slider it may push, else None.
 
-    Raises ConfigError when the simulated slider cannot be.
+    Raises ConfigError if the simulated slider is not possible (it would tip over).
     """
     control, bodies = rig.control, _bodies(rig)
     if control.controller != "force" or not bodies:
@@ -25,15 +25,15 @@ def gain_warning(rig: RigConfig) -> str | None:
     highest = limit(bodies, control.k_f)
     if control.k_y_rad_per_m <= WARN_SHARE * highest:
         return None
-    told = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
+    margin = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
     return (
         f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may oscillate: for the sliders of this rig at this k_f "
-        f"{told}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds better ones"
+        f"{margin}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds better ones"
     )
 
 
 def _bodies(rig: RigConfig) -> list[PushedBody]:
-    """Return the sliders of `[sliders]`, and the simulated one where there is one."""
+    """Return the sliders of `[sliders]`, and the simulated one if there is one."""
     world, pressure = rig.world, rig.sliders.pressure
     effects = FloorEffects(
         shift_m=world.slider.floor_friction * world.floor.push_height_m,
@@ -43,7 +43,7 @@ def _bodies(rig: RigConfig) -> list[PushedBody]:
     bodies = []
     for length in samples(rig.sliders.shortest_m, rig.sliders.longest_m):
         for outline in (Rectangle(length, length), Circle(length / 2)):
-            with contextlib.suppress(ConfigError):  # it would tip over: nobody pushes that one so high
+            with contextlib.suppress(ConfigError):  # it would tip over: nobody pushes it at that height
                 bodies.append(pushed_body(outline, pressure, effects, world.ball_radius_m))
     if not devices_at(rig, "hardware"):
         shape = slider_model(world.slider).shape

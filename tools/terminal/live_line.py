@@ -1,4 +1,4 @@
-"""What the operator sees while it runs: one line, rewritten on a terminal, once a second elsewhere; faults whole."""
+"""The operator's display during a run: one line, rewritten on a terminal, once a second elsewhere; faults in full."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from robot_io.rig.config import RigConfig
 from safety.faults import FAULTS
 
 USUAL_COLUMNS = 80
-"""Width of a terminal that does not say."""
+"""Width assumed if the terminal does not report it."""
 
 
 class LiveLine:
-    """Prints to stderr; never waits and never raises when nobody reads."""
+    """Prints to stderr; never waits and never raises if nobody reads it."""
 
     def __init__(self, rig: RigConfig, *, quiet: bool = False) -> None:
         self._rig = rig
@@ -28,7 +28,7 @@ class LiveLine:
         self._faults: tuple[str, ...] = ()
 
     def show(self, status: dict[str, Any]) -> None:
-        """Show one status of control."""
+        """Show one status event of control."""
         faults = tuple(status["faults"])
         for fault in faults:
             if fault not in self._faults:
@@ -42,7 +42,7 @@ class LiveLine:
         self._last_s = now_s
         line = self._line(status)
         if self._terminal:
-            # Cut, because a line that wraps cannot be rewritten: it would fill the screen.
+            # Cut to fit: a wrapped line cannot be rewritten and would fill the screen.
             room = self._room()
             line = line[:room]
             self._write(f"\r{line:<{min(self._width, room)}}")
@@ -51,20 +51,20 @@ class LiveLine:
             self._write(line + "\n")
 
     def say(self, text: str) -> None:
-        """Print a line of its own."""
+        """Print a separate line."""
         if self._terminal and self._width:
             self._write("\r" + " " * min(self._width, self._room()) + "\r")
             self._width = 0
         self._write(text + "\n")
 
     def end(self) -> None:
-        """Leave the line."""
+        """Move on to a new line."""
         if self._terminal and self._width:
             self._write("\n")
             self._width = 0
 
     def _line(self, status: dict[str, Any]) -> str:
-        # JSON has no NaN: a figure that is not known yet (no pose so far) arrives as null.
+        # JSON has no NaN: a figure that is not known yet (no pose so far) is sent as null.
         status = {key: math.nan if value is None else value for key, value in status.items()}
         fx, fy, _ = status["force_N"]
         control = self._rig.control
@@ -92,9 +92,9 @@ class LiveLine:
             return
 
     def _would_block(self) -> bool:
-        """Return whether nobody takes our lines now (a stopped terminal, a full pipe): then they are left out.
+        """Return whether a write would block now (a stopped terminal, a full pipe); such lines are dropped.
 
-        Whoever waits for the terminal cannot hear the operator.
+        While the launcher waits for the terminal, it cannot receive the operator's stop.
         """
         poll = select.poll()
         poll.register(sys.stderr.fileno(), select.POLLOUT)

@@ -1,4 +1,4 @@
-"""Signals and keys of the operator, as events of an event loop."""
+"""The operator's signals and keys, as events of an event loop."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from typing import Any
 from robot_io.ipc.event_loop import EventLoop
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
-"""What a terminal makes of Ctrl-C, Ctrl-\\ and Ctrl-Z is among them: keys like any other. A launcher that was put to
-sleep by Ctrl-Z would let the base push on, and hear no key."""
+"""The signals of Ctrl-C, Ctrl-\\ and Ctrl-Z are among them and count as keys. A launcher suspended by Ctrl-Z would
+receive no key while the base keeps pushing."""
 
 
 class OperatorKeys:
@@ -26,7 +26,7 @@ class OperatorKeys:
         self._loop = loop
         self._on_stop, self._on_resume = on_stop, on_resume
         self._pipe = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        # The pipe first: a signal that came between the two would be heard by nobody.
+        # The pipe first: a signal between the two calls would be lost.
         self._wakeup = signal.set_wakeup_fd(self._pipe[1])
         self._handlers = [signal.signal(number, _note) for number in SIGNALS]
         loop.add_fd(self._pipe[0], self._on_signal)
@@ -50,7 +50,7 @@ class OperatorKeys:
         if self._terminal is not None:
             self._loop.remove_fd(self._stdin)
             with contextlib.suppress(termios.error):  # the terminal is closed
-                # NOW, not DRAIN: a stopped terminal would never have shown everything.
+                # NOW, not DRAIN: on a stopped terminal DRAIN would wait forever.
                 termios.tcsetattr(self._stdin, termios.TCSANOW, self._terminal)
             self._terminal = None
 
@@ -63,7 +63,7 @@ class OperatorKeys:
     def _on_key(self, _events: int) -> None:
         try:
             key = os.read(self._stdin, 1)
-        except OSError:  # the terminal is closed; SIGHUP says so too
+        except OSError:  # the terminal is closed; SIGHUP arrives as well
             key = b""
         if not key:
             self._loop.remove_fd(self._stdin)
@@ -74,4 +74,4 @@ class OperatorKeys:
 
 
 def _note(_number: int, _frame: FrameType | None) -> None:
-    """Do nothing: the byte in the wake-up pipe does it."""
+    """Do nothing: the byte in the wake-up pipe is the event."""

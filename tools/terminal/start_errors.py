@@ -1,4 +1,4 @@
-"""Why a run did not begin: everything the processes said, as one error."""
+"""Why a run did not start: the errors of all processes, combined into one."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ ORDER = ("control", "arm", "gate")
 
 
 class Failure(NamedTuple):
-    """What one process said."""
+    """The error of one process."""
 
     name: str
     error: PushError
 
 
-def combined(failed: list[Child], rig: RigConfig) -> PushError:
-    """Return one error that names every device that failed, and what to do about each.
+def combined_error(failed: list[Child], rig: RigConfig) -> PushError:
+    """Return one error that names every device that failed and what to do about each.
 
-    Its exit code is theirs, 4 when they are of several kinds.
+    Its exit code is the one they share, or 4 if they differ.
     """
     found = [failure for child in failed for failure in _failures(child)]
     found.sort(key=lambda failure: ORDER.index(failure.name) if failure.name in ORDER else len(ORDER))
@@ -32,13 +32,13 @@ def combined(failed: list[Child], rig: RigConfig) -> PushError:
     kind = KINDS.get(codes.pop(), PushError) if len(codes) == 1 else DeviceError
     if len(found) == 1:
         name, only = found[0]
-        return kind(only.what, where=_named(name, only.where, rig), do=only.do)
-    what = "; ".join(f"{_named(name, error.where, rig)}: {error.what}" for name, error in found)
+        return kind(only.what, where=_with_device_name(name, only.where, rig), do=only.do)
+    what = "; ".join(f"{_with_device_name(name, error.where, rig)}: {error.what}" for name, error in found)
     do = "; ".join(f"{_device(name, rig)}: {error.do}" for name, error in found if error.do)
     return kind(what, do=do)
 
 
-def not_in_time(waiting: list[Child], rig: RigConfig) -> DeviceError:
+def start_timeout(waiting: list[Child], rig: RigConfig) -> DeviceError:
     """Return the error of processes that neither became ready nor failed."""
     names = ", ".join(f"{_device(child.name, rig)} (process {child.pid})" for child in waiting)
     return DeviceError(f"not ready in time: {names}", do="Check what this machine is busy with, and try again")
@@ -52,12 +52,12 @@ def _failures(child: Child) -> list[Failure]:
 
 
 def _device(name: str, rig: RigConfig) -> str:
-    """Return the device that a process opens, or the process's own name."""
+    """Return the name of the device that a process opens, or the process's own name."""
     kinds = {"control": rig.ft.kind, "arm": rig.arm.kind, "gate": rig.base.kind}
     return name_of(kinds[name]) if name in kinds else name
 
 
-def _named(name: str, where: str, rig: RigConfig) -> str:
-    """Return the place with the device's name in front, once."""
+def _with_device_name(name: str, where: str, rig: RigConfig) -> str:
+    """Return `where` with the device's name in front, unless it is there already."""
     device = _device(name, rig)
     return where if where.startswith(device) else f"{device} {where}".strip()

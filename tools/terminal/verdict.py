@@ -1,4 +1,4 @@
-"""The end of a run in words and numbers: `summary.json`, the `--json` object, and what a person reads."""
+"""The result of a run in words and numbers: `summary.json`, the `--json` object and the lines for people."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def summary(
     devices: dict[str, dict[str, int]],
     notes: list[str],
 ) -> dict[str, Any]:
-    """Return the summary of a run (schema 1); `figures` is what control said at its end."""
+    """Return the summary of a run (schema 1); `figures` is what control reported at its end."""
     code = figures["exit_code"]
     return {
         "schema": 1,
@@ -59,13 +59,15 @@ def summary(
 
 
 def person_lines(summary: dict[str, Any]) -> list[str]:
-    """Return the lines a person reads at the end of a run."""
+    """Return the lines printed for people at the end of a run."""
     distance, lateral = summary["distance_m"], summary["lateral_error_m"]
     lines = []
     if summary["exit_code"] == 0:
         lines.append(f"pushed {distance:.2f} m, lateral error {lateral:+.3f} m")
     else:
-        lines.append(f"{summary['verdict']} after {distance:.2f} m, lateral offset {lateral:+.3f} m: {why(summary)}")
+        lines.append(
+            f"{summary['verdict']} after {distance:.2f} m, lateral offset {lateral:+.3f} m: {stop_reason(summary)}"
+        )
     loop = summary["loop"]
     if "late_p99_ms" in loop:
         lines.append(
@@ -83,18 +85,18 @@ def person_lines(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-def why(summary: dict[str, Any]) -> str:
-    """Return the faults that ended a run, in words; what only followed from the stop is left out."""
+def stop_reason(summary: dict[str, Any]) -> str:
+    """Return the faults that ended a run, in words; those that only followed from the stop are left out."""
     stopping = next((event for event in summary["safety_events"] if event["mode"] in ("STOP", "DEAD")), None)
     faults = stopping["faults"] if stopping else summary["faults"]
     reasons = [FAULTS[i].text for i in faults if i in FAULTS and FAULTS[i].mode >= Mode.HOLD]
     if not reasons and summary["verdict"] == "contact lost":
-        return lost(summary["contact_seen"])
+        return contact_loss_reason(summary["contact_seen"])
     return "; ".join(reasons) or summary["verdict"]
 
 
-def lost(contact_seen: bool) -> str:
-    """Return why a push failed without contact; an object too light to be felt may have been there all the same."""
+def contact_loss_reason(contact_seen: bool) -> str:
+    """Return why a push failed without contact; an object too light to be felt may still have been there."""
     return "the force did not return" if contact_seen else "no contact was felt"
 
 

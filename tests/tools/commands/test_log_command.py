@@ -64,7 +64,7 @@ def last_json(capsys) -> dict:
 def test_info_for_people_and_for_scripts(log, capsys):
     assert main(["log", "info", str(log)]) == 0
     text = capsys.readouterr().out
-    assert "150 messages, whole" in text
+    assert "150 messages, intact" in text
     assert "geometry_msgs/msg/WrenchStamped" in text
     assert "seed = 3" in text
     assert main(["log", "info", str(log), "--json"]) == 0

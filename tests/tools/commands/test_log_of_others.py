@@ -82,7 +82,7 @@ def test_topics_that_cannot_be_read_are_named_with_the_reason_and_the_rest_is_re
     assert [file.name for file in (tmp_path / "out").iterdir()] == ["t.csv"]
     assert main(["log", "info", str(mixed)]) == 0
     out = capsys.readouterr().out
-    assert "8 messages, whole" in out
+    assert "8 messages, intact" in out
     assert "/json cannot be read: its messages are in json" in out
 
 

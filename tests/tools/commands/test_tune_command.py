@@ -54,7 +54,7 @@ def test_k_f_stays_clear_of_the_fast_loop(tmp_path, capsys):
         "--width-m", "0.7,0.7", "--pressures", "rim",
     )  # fmt: skip
     assert result["recommended"]["k_f"] < 0.3
-    assert "k_f 0.3 is not taken" in err
+    assert "k_f 0.3 is not used" in err
     assert result["recommended"]["k_f"] <= 0.5 * result["fast_loop_k_f"]
     body = PushedBody(False, 0.15, (0.15**2 + 0.35**2) ** 0.5, 0.05, 0.045)
     assert result["fast_loop_k_f"] == pytest.approx(fast_loop_k_f([body]))

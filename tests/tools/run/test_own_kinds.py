@@ -111,7 +111,7 @@ class Weak(Whole):
         ("kinds:Endless", "not finite"),
         ("kinds:Silent", "is not above 0"),
         ("kinds:Weak", "limits.max_force_N = 150 is above 90 N"),
-        ("kinds:NoEmulator", "names no emulator"),
+        ("kinds:NoEmulator", "has no emulator"),
         ("os:path", "is not a class"),
     ],
 )

@@ -20,7 +20,7 @@ from robot_io.errors import (
 )
 from robot_io.ipc.spawn import Child
 from robot_io.rig.config import load_rig
-from tools.terminal.start_errors import combined, not_in_time
+from tools.terminal.start_errors import combined_error, start_timeout
 
 RIG = load_rig("emulated")
 
@@ -51,19 +51,19 @@ def said(kind, what, where="there", do="Do this"):
 
 
 def test_one_failure_keeps_its_parts(child):
-    error = combined([child("gate", errors=[said(DeviceNotReady, "it is off", "ws://a:1", "Switch it on")])], RIG)
+    error = combined_error([child("gate", errors=[said(DeviceNotReady, "it is off", "ws://a:1", "Switch it on")])], RIG)
     assert type(error) is DeviceError
     assert (error.what, error.where, error.do) == ("it is off", "ridgeback ws://a:1", "Switch it on")
 
 
 def test_a_place_that_names_the_device_is_not_named_twice(child):
-    error = combined([child("control", errors=[said(DeviceNotReady, "no such port", "ft300 /dev/x")])], RIG)
+    error = combined_error([child("control", errors=[said(DeviceNotReady, "no such port", "ft300 /dev/x")])], RIG)
     assert error.where == "ft300 /dev/x"
 
 
 def test_several_are_named_in_one_order_each_with_what_to_do(child):
     failed = [child(name, errors=[said(DeviceNotReady, f"{name} fails")]) for name in ("gate", "arm", "control")]
-    error = combined(failed, RIG)
+    error = combined_error(failed, RIG)
     assert error.exit_code == 4
     assert error.what == "ft300 there: control fails; ur10 there: arm fails; ridgeback there: gate fails"
     assert error.do == "ft300: Do this; ur10: Do this; ridgeback: Do this"
@@ -79,17 +79,17 @@ def test_several_are_named_in_one_order_each_with_what_to_do(child):
 )
 def test_the_exit_code_is_theirs(child, kinds, kind):
     failed = [child(name, errors=[said(one, "no")]) for name, one in zip(("arm", "gate"), kinds, strict=False)]
-    assert type(combined(failed, RIG)) is kind
+    assert type(combined_error(failed, RIG)) is kind
 
 
 def test_the_recorder_is_no_device(child):
-    error = combined([child("recorder", errors=[EnvironmentFault("the disk is full")])], RIG)
+    error = combined_error([child("recorder", errors=[EnvironmentFault("the disk is full")])], RIG)
     assert (error.exit_code, error.what, error.where) == (3, "the disk is full", "recorder")
 
 
 def test_a_crash_is_a_defect_whose_traceback_is_kept(child, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    error = combined([child("arm", "raise ValueError('planted')")], RIG)
+    error = combined_error([child("arm", "raise ValueError('planted')")], RIG)
     assert type(error) is PushError
     assert error.exit_code == 1
     assert error.what == "its process ended with code 1 (ValueError: planted)"
@@ -99,12 +99,12 @@ def test_a_crash_is_a_defect_whose_traceback_is_kept(child, tmp_path, monkeypatc
 
 
 def test_a_killed_process_names_the_signal(child):
-    error = combined([child("gate", "import os; os.kill(os.getpid(), 9)")], RIG)
+    error = combined_error([child("gate", "import os; os.kill(os.getpid(), 9)")], RIG)
     assert (error.what, error.do) == ("its process was killed by SIGKILL", "")
 
 
 def test_one_that_hangs_is_named(child):
     hanging = child("arm")
-    error = not_in_time([hanging], RIG)
+    error = start_timeout([hanging], RIG)
     assert error.exit_code == 4
     assert f"ur10 (process {hanging.pid})" in error.what

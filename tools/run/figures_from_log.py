@@ -1,4 +1,4 @@
-"""What a run came to when control could not say it itself: read from the log that the recorder finished."""
+"""The figures of a run whose control process could not report them, read from the log that the recorder finished."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from robot_io.mcap.read import read_log
 from robot_io.tick import TICK_CDR, ControlTick, Mode
 
 
-def figures_of(log: Path, rate_hz: float, exit_code: int) -> dict[str, Any]:
-    """Return the figures of a run from its ticks and the gate's last events, as control says them at its end.
+def figures_from_log(log: Path, rate_hz: float, exit_code: int) -> dict[str, Any]:
+    """Return the figures of a run from its ticks and the gate's last events, as control reports them when it ends.
 
     Raises LogDamaged (or UsageError: no file) when the log cannot be read or holds no tick.
     """

@@ -1,4 +1,4 @@
-"""A log that comes out of a pipe, kept in a file while it is read: a log is read more than once."""
+"""Copy a log from a pipe into a temporary file: a log is read more than once."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from robot_io.mcap.walk import MAGIC
 _BLOCK_BYTES = 1 << 20
 
 
-def comes_once(named: Path) -> bool:
-    """Return whether it can be read only once: a pipe or a device."""
+def is_stream(named: Path) -> bool:
+    """Return whether `named` can be read only once: a pipe or a device."""
     try:
         mode = named.stat().st_mode
     except OSError:
-        return False  # whoever opens it says what is wrong
+        return False  # opening it will say what is wrong
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 @contextmanager
-def at_rest(named: Path) -> Iterator[Path]:
-    """Yield `named`, or for a pipe or a device a temporary copy of what comes out of it.
+def as_file(named: Path) -> Iterator[Path]:
+    """Yield `named`, or for a pipe or a device a temporary copy of its content.
 
-    Errors raised meanwhile speak of `named`. Raises UsageError when it cannot be read, EnvironmentFault when the copy
-    cannot be written.
+    Errors raised in the block name `named`. Raises UsageError if it cannot be read, EnvironmentFault if the copy cannot
+    be written.
     """
-    if not comes_once(named):
+    if not is_stream(named):
         yield named
         return
     with tempfile.TemporaryDirectory(prefix="push-log-") as folder:
@@ -55,11 +55,11 @@ def _copy(named: Path, copy: Path) -> None:
             with copy.open("wb") as target:
                 block = source.read(_BLOCK_BYTES)
                 target.write(block)
-                if block.startswith(MAGIC):  # what is no log may have no end
+                if block.startswith(MAGIC):  # anything but a log may never end
                     shutil.copyfileobj(source, target, _BLOCK_BYTES)
         except OSError as error:
             raise EnvironmentFault(
-                f"what comes out of the pipe cannot be kept: {error.strerror}",
+                f"the content of the pipe cannot be saved: {error.strerror}",
                 where=str(copy.parent),
-                do="Make room, or save the log to a file elsewhere and name that",
+                do="Free some space, or save the log to a file elsewhere and name that file",
             ) from None

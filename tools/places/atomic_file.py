@@ -1,0 +1,30 @@
+"""Write files atomically: readers see the complete file or none, whatever fails."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file, replacing any existing one. Raises OSError, and then leaves nothing behind."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write a JSON file for people and programs. Raises OSError, or ValueError for a number that is not finite."""
+    write_atomically(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())
+
+
+def check_writable(folder: Path) -> None:
+    """Raise OSError unless files can be created in a folder: better now than at the end of a run."""
+    probe = folder / ".writable"
+    probe.touch()
+    probe.unlink()
