@@ -4,8 +4,8 @@ import subprocess
 import sys
 
 PROGRAM = """
-from tools.dev.mutants.pool import work
-print(sorted(work(list(range(7)), lambda tree, job: job * job, 3)))
+from tools.dev.mutants.pool import run_jobs
+print(sorted(run_jobs(list(range(7)), lambda tree, job: job * job, 3)))
 """
 
 
