@@ -8,11 +8,12 @@ import msgspec
 
 from control.push_course import PushCourse
 from control.run_notes import outcome
-from robot_io.tick import ControlTick
+from robot_io.tick import ControlTick, Mode
+from safety.faults import FAULTS
 from tools.report.run_data import RunData
 from tools.terminal.verdict import cause_words, contact_loss_reason
 from tools.verdict.evidence import TrustItem, gather
-from tools.verdict.first_cause import first_fault
+from tools.verdict.first_cause import fault_words, first_fault
 from tools.verdict.judgement import CONTACT_LOST, judge
 from tools.verdict.witness import Witness
 
@@ -36,7 +37,7 @@ def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
     trust = _told(summary) or tuple(gather(run.rig, end, _witness(run)))
     distance, lateral = f"{end['distance_m']:.2f} m", f"{end['lateral_error_m']:+.3f} m"
     first = first_fault(run.rig, end)
-    why = cause_words(first, end["faults"]) if first else ""
+    why = cause_words(first, end["faults"]) if first else _without_first(end["faults"])
     if not run.last.output.finished:
         phase = str(end["phase"]).lower().replace("_", " ")
         return Verdict(
@@ -55,6 +56,11 @@ def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
         why = contact_loss_reason(end["contact_seen"]).capitalize()
     why = f"{why or 'See the safety events'}. Lateral offset at the end: {lateral}."
     return Verdict(f"{judged.verdict.capitalize()} after {distance}", why, False, trust)
+
+
+def _without_first(faults: list[str]) -> str:
+    """Return the faults that stopped a run in words: logs of earlier versions do not tell which came first."""
+    return "; ".join(fault_words(i, None, None, "") for i in faults if i in FAULTS and FAULTS[i].mode >= Mode.HOLD)
 
 
 def trust_rows(trust: tuple[TrustItem, ...]) -> list[tuple[str, str, str]]:

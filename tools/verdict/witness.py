@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from robot_io.mcap.walk import MAGIC
+from robot_io.mcap.write import MAGIC
 
 
 class Witness(msgspec.Struct, frozen=True):
