@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO, TypeVar, cast
 
-from tools.dev.mutants import session
-from tools.dev.mutants.tree import Tree
+from tools.dev.mutants.trial import session
+from tools.dev.mutants.trial.tree import Tree
 
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
