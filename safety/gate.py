@@ -16,6 +16,8 @@ import msgspec
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
 from safety.envelope import EnvelopeLimits, too_fast
+from safety.motion_bounds import TravelLimits
+from safety.travel import Travel
 
 ZERO = BodyTwist()
 
@@ -47,6 +49,8 @@ class Latch(IntEnum):
     LINK = 11
     EOF_MOVING = 12
     PAUSED = 13
+    TRAVEL = 14
+    MOVING_TIME = 15
 
 
 LATCH_TEXT = {
@@ -64,6 +68,8 @@ LATCH_TEXT = {
     Latch.LINK: "the base link is gone",
     Latch.EOF_MOVING: "control died while the base was moving",
     Latch.PAUSED: "the gate itself was frozen for more than 100 ms",
+    Latch.TRAVEL: "the base has travelled further than this push can need",
+    Latch.MOVING_TIME: "the base has moved for longer than this push can need",
 }
 
 LATCH_FAULT = {
@@ -73,6 +79,8 @@ LATCH_FAULT = {
     Latch.OVERSPEED: "F35",
     Latch.LINK: "F30",
     Latch.PAUSED: "F67",
+    Latch.TRAVEL: "F47",
+    Latch.MOVING_TIME: "F48",
 }
 """The row of the fault table for each latch; any other latch is F36, a command that was refused."""
 
@@ -129,6 +137,13 @@ def on_speed(limits: EnvelopeLimits, state: GateState, twist: BodyTwist) -> Gate
     count = state.overspeed + 1 if too_fast(limits, twist) else 0
     state = msgspec.structs.replace(state, overspeed=count)
     return latched(state, Latch.OVERSPEED) if count >= OVERSPEED_SAMPLES and not state.latch else state
+
+
+def on_travel(limits: TravelLimits, state: GateState, travel: Travel) -> GateState:
+    """Latch when the base has travelled further, or moved for longer, than the whole run can need."""
+    if travel.distance_m > limits.distance_m:
+        return latched(state, Latch.TRAVEL)
+    return latched(state, Latch.MOVING_TIME) if travel.moving_ns > limits.moving_s * 1e9 else state
 
 
 def on_eof(state: GateState) -> GateState:

@@ -52,6 +52,7 @@ class Gate:
             "frames": {**UNTURNED, "sensor_in_base_m": (0, 0, 0)},
             "kind_folder": "",
             "limits": LIMITS,
+            "bounds": {"distance_m": 2.0, "moving_s": 30.0},
             **dict(zip(("control_fd", "record_fd", "ring_fd"), fds, strict=True)),
             "status_fd": -1,
             "wall_offset_ns": 0,

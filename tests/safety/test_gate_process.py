@@ -18,6 +18,7 @@ from safety import gate_process
 from safety.envelope import EnvelopeLimits
 from safety.gate import Latch
 from safety.gate_process import GateJob, GateProcess
+from safety.motion_bounds import TravelLimits
 
 LIMITS = EnvelopeLimits(0.15, 0.25, 0.5, 1.0, 10_000_000)
 FRAMES = FramesConfig(((1, 0, 0), (0, 1, 0), (0, 0, 1)), (0, 0, 0), (0, 0, 0))
@@ -65,6 +66,7 @@ class Rig:
             FRAMES,
             "",
             LIMITS,
+            TravelLimits(2.0, 30.0),
             gate_end.detach(),
             self.record_out.fd,
             self.ring.fd,
