@@ -15,7 +15,7 @@ import msgspec
 
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
-from safety.envelope import EnvelopeLimits, too_fast
+from safety.envelope import EnvelopeLimits, contact_speed, reduces, too_fast
 from safety.motion_bounds import TravelLimits
 from safety.travel import Travel
 
@@ -29,6 +29,8 @@ STEP_MARGIN = 1.2
 """A step of the command may exceed the acceleration limit by this much (rounding, lateness)."""
 REPEAT_NS = 18_000_000
 """Unchanged or growing commands are sent every 20 ms (less the jitter of a tick); reduced and zero ones at once."""
+CONTACT_MARGIN = 1.001
+"""The contact ball may exceed the envelope by this much (rounding in the envelope's scaling)."""
 OVERSPEED_SAMPLES = 3
 
 
@@ -51,6 +53,7 @@ class Latch(IntEnum):
     PAUSED = 13
     TRAVEL = 14
     MOVING_TIME = 15
+    CONTACT_SPEED = 16
 
 
 LATCH_TEXT = {
@@ -68,6 +71,7 @@ LATCH_TEXT = {
     Latch.LINK: "the base link is gone",
     Latch.EOF_MOVING: "control died while the base was moving",
     Latch.PAUSED: "the gate itself was frozen for more than 100 ms",
+    Latch.CONTACT_SPEED: "control sent a velocity at which the contact ball is beyond the envelope",
     Latch.TRAVEL: "the base has travelled further than this push can need",
     Latch.MOVING_TIME: "the base has moved for longer than this push can need",
 }
@@ -161,7 +165,7 @@ def due(state: GateState, now_ns: int) -> BodyTwist | None:
     if state.frame_ns == 0 and not state.latch:
         return None
     wanted = state.twist
-    if now_ns - state.sent_ns >= REPEAT_NS or (wanted != state.sent and _reduces(wanted, state.sent)):
+    if now_ns - state.sent_ns >= REPEAT_NS or (wanted != state.sent and reduces(wanted, state.sent)):
         return wanted
     return None
 
@@ -187,7 +191,9 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
         1.0 + 1e-9
     ):
         return Latch.ENVELOPE
-    if not _reduces(twist, state.twist):
+    if not reduces(twist, state.twist):
+        if contact_speed(limits, twist) > CONTACT_MARGIN * limits.speed:
+            return Latch.CONTACT_SPEED
         ticks = frame.tick - state.tick if state.tick >= 0 else 1
         # More ticks than fit into the longest allowed silence do not justify a larger jump.
         time_s = min(ticks * limits.period_ns, FRAME_MAX_AGE_NS + limits.period_ns) * 1e-9
@@ -199,10 +205,3 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
         ):
             return Latch.STEP
     return Latch.NONE
-
-
-def _reduces(new: BodyTwist, old: BodyTwist) -> bool:
-    """Return whether every component moves towards zero or stays the same."""
-    return all(
-        abs(b) <= abs(a) and a * b >= 0.0 for a, b in ((old.vx, new.vx), (old.vy, new.vy), (old.omega, new.omega))
-    )

@@ -11,8 +11,7 @@ OVERDUE_CONTACT_M = 0.5
 RESUMES = 3
 """An operator may resume a push this often."""
 PATH_RATIO = 1.25
-"""The way of the contact point is longer than its progress along the path; the largest over seeds and starts half a metre off
-was 1.012; it leaves room for objects that turn away."""
+"""The way of the contact point is longer than its progress: 1.012 times over seeds and starts half a metre off."""
 SLIP_FACTOR = 1.1
 """Wheels that slip turn further than the base moves."""
 SLOW_FACTOR = 2.0

@@ -51,6 +51,7 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
         limits = rig.limits
         period_ns = round(1e9 / rig.loop.rate_hz)
         bounds = total_bounds(rig)
+        contact_x, contact_y, _ = rig.frames.contact_in_base_m
         fx, fy, fz, mx, my, mz = rig.ft.declared.range
         return cls(
             period_ns,
@@ -74,6 +75,8 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
                 limits.max_acceleration_m_per_s2,
                 limits.max_yaw_acceleration_rad_per_s2,
                 period_ns,
+                contact_x,
+                contact_y,
             ),
             bounds.distance_m,
             bounds.moving_s,

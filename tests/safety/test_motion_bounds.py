@@ -19,7 +19,7 @@ from tools.rig import resolve_rig
 MS = 1_000_000
 S = 1_000 * MS
 ZERO, PUSH = BodyTwist(), BodyTwist(0.06, 0.08, 0.0)  # 0.1 m/s
-LIMITS = EnvelopeLimits(0.15, 0.25, 1.0, 0.5, 10 * MS)
+LIMITS = EnvelopeLimits(0.15, 0.25, 1.0, 0.5, 10 * MS, 0.0, 0.0)
 BOUNDS = TravelLimits(2.0, 30.0)
 
 
