@@ -268,6 +268,10 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     """The `Latch` that came first, 0: none."""
     published_ns: int = 0
     """When this record was written."""
+    travel_m: float = 0.0
+    """How far the base has travelled since the run's first motion: as sent or as measured, whichever is more."""
+    moving_s: float = 0.0
+    """How long it has moved since then."""
 
 
 NO_BASE = BaseRecord()
