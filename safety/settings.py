@@ -10,6 +10,7 @@ from robot_io.messages import Joints, Vector6
 from robot_io.rig.config import FtConfig, RigConfig
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
+from safety.workspace import WorkspaceSettings
 
 SATURATED = 0.95
 """Share of the sensor's range."""
@@ -40,6 +41,7 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     pose_period_ns: int
     push_speed: float
     envelope: EnvelopeLimits
+    workspace: WorkspaceSettings
 
     @classmethod
     def of(cls, rig: RigConfig) -> SafetySettings:
@@ -70,6 +72,7 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
                 limits.max_yaw_acceleration_rad_per_s2,
                 period_ns,
             ),
+            WorkspaceSettings.of(rig),
         )
 
 
