@@ -7,9 +7,9 @@ import pytest
 from tools.dev.mutants import choose, targets
 from tools.dev.mutants.equivalents import BadList, Equivalent, read_equivalents
 from tools.dev.mutants.find import find_mutants
-from tools.dev.mutants.judge import Verdict
-from tools.dev.mutants.reach import Reach
 from tools.dev.mutants.summary import Summary
+from tools.dev.mutants.trial.judge import Verdict
+from tools.dev.mutants.trial.reach import Reach
 
 KILLED, SURVIVED = Verdict("killed", "tests/test_x.py::test"), Verdict("survived", "")
 
