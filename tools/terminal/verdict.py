@@ -69,18 +69,14 @@ def summary(
 
 def person_lines(summary: dict[str, Any]) -> list[str]:
     """Return the lines printed for people at the end of a run."""
-    verdict, where = summary["verdict"], _where(summary)
-    distance_m = summary["distance_m"]
-    against = [item["text"] for item in summary["trust"] if item["says"] == "against"]
-    unknown = [item["text"] for item in summary["trust"] if item["says"] == "unknown"]
-    if verdict == DONE:
-        lines = [f"pushed {distance_m:.2f} m, lateral error {where}"]
-    elif verdict in (OFF_THE_LINE, NOT_TRUSTED):
-        lines = [f"pushed {distance_m:.2f} m, lateral error {where}, but {verdict}: {'; '.join(against)}"]
+    verdict, where, distance_m = summary["verdict"], _where(summary), summary["distance_m"]
+    if verdict in (DONE, OFF_THE_LINE, NOT_TRUSTED):
+        against = "; ".join(_told(summary, "against"))
+        but = f", but {verdict}: {against}" if against else ""
+        lines = [f"pushed {distance_m:.2f} m, lateral error {where}{but}"]
+        lines += [f"not known: {text}" for text in _told(summary, "unknown")]
     else:
         lines = [f"{verdict} after {distance_m:.2f} m, lateral offset {where}: {stop_reason(summary)}"]
-        lines += [f"against the run: {text}" for text in against]
-    lines += [f"not known: {text}" for text in unknown]
     loop = summary["loop"]
     if "late_p99_ms" in loop:
         lines.append(
@@ -96,6 +92,11 @@ def person_lines(summary: dict[str, Any]) -> list[str]:
     if summary.get("report"):
         lines.append(f"report: {summary['report']}")
     return lines
+
+
+def _told(summary: dict[str, Any], says: str) -> list[str]:
+    """Return the evidence that speaks for or against a run, or is unknown, in words."""
+    return [item["text"] for item in summary["trust"] if item["says"] == says]
 
 
 def _where(summary: dict[str, Any]) -> str:
