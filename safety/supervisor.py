@@ -72,6 +72,7 @@ def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
     latched = tuple(dict.fromkeys([*state.latched, "F68"]))
     mode = max(Mode(state.mode), FAULTS["F68"].mode)
     state = replace(state, mode=int(mode), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
+    state = _note_first(state, ["F68"], inp.now_ns)
     return state, Verdict(mode, latched, (math.nan,) * len(latched), True, FAULTS["F68"].exit_code)
 
 

@@ -170,6 +170,15 @@ class ControlConfig(Table, frozen=True):
     """How far the base backs off after the push, so that the sensor can be checked out of contact (0: not at all)."""
 
 
+class GoalConfig(Table, frozen=True):
+    """Where the contact ball has to be for a push to count as done. It decides the verdict and never stops the base."""
+
+    corridor_m: Annotated[float, Meta(gt=0, le=10)] = 0.5
+    """How far the ball may be from the path at any time of the push, to either side."""
+    end_tolerance_m: Annotated[float, Meta(gt=0, le=10)] = 0.3
+    """How far it may be at the end. A push that starts further off may end as far off as it started."""
+
+
 class LimitsConfig(Table, frozen=True):
     """Limits of this rig; the program's own ceilings (`safety/limits.py`) may only be lowered."""
 
@@ -204,6 +213,7 @@ class RigConfig(Table, frozen=True):
     path: PathConfig = PathConfig()
     sliders: SlidersConfig = SlidersConfig()
     control: ControlConfig = ControlConfig()
+    goal: GoalConfig = GoalConfig()
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
     goal: GoalConfig = GoalConfig()

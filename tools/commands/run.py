@@ -22,6 +22,8 @@ from tools.run.run_state import status_line
 from tools.terminal import verdict
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.verdict.object_pose import object_pose
+from tools.verdict.witness import Witness
 
 MAX_SEED = 2**63 - 1
 """The largest integer that the log can hold."""
@@ -160,6 +162,8 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         level=level_of(rig),
         devices=launcher.devices(figures),
         notes=launcher.notes,
+        witness=launcher.witness(figures),
+        pushed=launcher.pushed(),
     )
 
 
@@ -207,6 +211,8 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         level="sim",
         devices=figures["devices"],
         notes=[],
+        witness=Witness(),
+        pushed=object_pose(rig.path, log.object_poses),
     )
 
 

@@ -126,8 +126,7 @@ def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: floa
         "finished",
         **figures,
         loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns),
-        events=loop.notes.events,
-        fault_counts=loop.notes.fault_counts,
+        **loop.notes.figures(),
         ft=counters,
         error="" if loop.error is None else f"{type(loop.error).__name__}: {loop.error}",
     )

@@ -110,8 +110,7 @@ class Lockstep:
         return {
             **outcome(inp, self._state, output),
             "loop": {"rate_hz": self.rig.loop.rate_hz, "ticks": tick + 1, "skipped": 0},
-            "events": self.notes.events,
-            "fault_counts": self.notes.fault_counts,
+            **self.notes.figures(),
             "devices": counters,
         }
 
@@ -142,7 +141,7 @@ class Lockstep:
         message = tick_message(inp, self._state, after, output)
         self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
         self._state = after
-        self.notes.note(inp, output)
+        self.notes.note(inp, after, output)
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
         """Pass the command through the gate, as the gate process does."""
