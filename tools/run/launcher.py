@@ -22,6 +22,7 @@ from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import leave_realtime, try_realtime
 from robot_io.ipc.spawn import Child
 from robot_io.rig.config import RigConfig
+from robot_io.rig.fault_words import parse_fault
 from safety.gate import Latch
 from tools.kinds import name_of
 from tools.places import run_dir
@@ -97,11 +98,19 @@ class Launcher:
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
         """Return the counters of the three drivers, by device name."""
+        counters, injected = self._finished_event("gate").get("counters", {}), self.injected(figures)
         return {
             name_of(self._rig.ft.kind): figures["ft"],
             name_of(self._rig.arm.kind): {"packets": figures["arm_packets"]},
-            name_of(self._rig.base.kind): self._finished_event("gate").get("counters", {}),
+            name_of(self._rig.base.kind): {k: n for k, n in counters.items() if k not in injected},
         }
+
+    def injected(self, figures: dict[str, Any]) -> dict[str, int]:
+        """Return how many samples each injected fault changed, by its words; none for a process that did not say."""
+        by_gate: dict[str, int] = self._finished_event("gate").get("counters", {})
+        by_control: dict[str, int] = figures.get("injected", {})
+        words = {parse_fault(word).text for word in self._rig.faults.inject}
+        return by_control | {word: n for word, n in by_gate.items() if word in words}
 
     # --- start -----------------------------------------------------------------------------------------------
 
