@@ -200,6 +200,13 @@ class LimitsConfig(Table, frozen=True):
     """... and at which it stops (F20)."""
 
 
+class FaultsConfig(Table, frozen=True):
+    """Faults to inject at levels sim and emulated, for rehearsals and tests (docs/faults.md)."""
+
+    inject: tuple[str, ...] = ()
+    """Each `DEVICE.KIND[=VALUE] at T s [for T s]`, as after `push run --fault`."""
+
+
 class RigConfig(Table, frozen=True):
     """One robot, real or not: its devices, frames, path, gains, limits and, where simulated, its world."""
 
@@ -218,6 +225,7 @@ class RigConfig(Table, frozen=True):
     workspace: WorkspaceConfig = WorkspaceConfig()
     goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
+    faults: FaultsConfig = FaultsConfig()
 
 
 def shipped_rigs() -> list[str]:

@@ -25,6 +25,7 @@ from robot_io.ipc.process import leave_realtime, try_realtime
 from robot_io.ipc.spawn import Child
 from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
+from robot_io.rig.fault_words import parse_fault
 from safety.gate import Latch
 from tools.kinds import name_of
 from tools.places import run_dir
@@ -102,10 +103,11 @@ class Launcher:
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
         """Return the counters of the three drivers, by device name."""
+        counters, injected = self._finished_event("gate").get("counters", {}), self.injected(figures)
         return {
             name_of(self._rig.ft.kind): figures["ft"],
             name_of(self._rig.arm.kind): {"packets": figures["arm_packets"]},
-            name_of(self._rig.base.kind): self._finished_event("gate").get("counters", {}),
+            name_of(self._rig.base.kind): {k: n for k, n in counters.items() if k not in injected},
         }
 
     def witness(self, figures: dict[str, Any]) -> Witness:
@@ -122,6 +124,13 @@ class Launcher:
         """Return where the object is, once `run` has returned; None if that is not known."""
         poses = self._finished_event("recorder").get("object_poses")
         return object_pose(self._rig.path, msgspec.convert(poses, tuple[Pose2D, Pose2D] | None))
+
+    def injected(self, figures: dict[str, Any]) -> dict[str, int]:
+        """Return how many samples each injected fault changed, by its words; none for a process that did not say."""
+        by_gate: dict[str, int] = self._finished_event("gate").get("counters", {})
+        by_control: dict[str, int] = figures.get("injected", {})
+        words = {parse_fault(word).text for word in self._rig.faults.inject}
+        return by_control | {word: n for word, n in by_gate.items() if word in words}
 
     # --- start -----------------------------------------------------------------------------------------------
 
