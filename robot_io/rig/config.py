@@ -90,6 +90,8 @@ class BaseConfig(Table, frozen=True):
     """A shipped kind, or `package.module:Class`."""
     level: Level = "emulated"
     url: str = ""
+    """`ws://host:port` of rosbridge, or `wss://host:port`: then its certificate is checked against the system's store,
+    or the file that the environment variable SSL_CERT_FILE names."""
     pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
     """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
