@@ -91,6 +91,8 @@ class BaseConfig(Table, frozen=True):
     """A shipped kind, or `package.module:Class`."""
     level: Level = "emulated"
     url: str = ""
+    """`ws://host:port` of rosbridge, or `wss://host:port`: then its certificate is checked against the system's store,
+    or the file that the environment variable SSL_CERT_FILE names."""
     pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
     """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
@@ -170,15 +172,6 @@ class ControlConfig(Table, frozen=True):
     """How far the base backs off after the push, so that the sensor can be checked out of contact (0: not at all)."""
 
 
-class GoalConfig(Table, frozen=True):
-    """Where the contact ball has to be for a push to count as done. It decides the verdict and never stops the base."""
-
-    corridor_m: Annotated[float, Meta(gt=0, le=10)] = 0.5
-    """How far the ball may be from the path at any time of the push, to either side."""
-    end_tolerance_m: Annotated[float, Meta(gt=0, le=10)] = 0.3
-    """How far it may be at the end. A push that starts further off may end as far off as it started."""
-
-
 class LimitsConfig(Table, frozen=True):
     """Limits of this rig; the program's own ceilings (`safety/limits.py`) may only be lowered."""
 
@@ -223,7 +216,6 @@ class RigConfig(Table, frozen=True):
     goal: GoalConfig = GoalConfig()
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
-    goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()
 

@@ -13,8 +13,8 @@ from robot_io.tick import TickInput, TickOutput, TickState
 from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
 from tools.places.atomic_file import write_json
+from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
-from tools.places.state_dir import RigLock
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
 from tools.run.run_facts import level_of
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     simulated = bool(devices_at(rig, "sim"))
     if not simulated:
         print_levels(rig)
-    with RigLock(rig.name) if not simulated else _NoLock():
+    with DeviceLocks(rig):
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
@@ -272,11 +272,3 @@ def write_report(summary: dict[str, Any], out: Path, ready: ReportProcess | None
         tell(f"no report: {reason}; `push report {out}` makes one from the log")
     else:
         summary["report"] = str(out / "report.html")
-
-
-class _NoLock:
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, *_: object) -> None:
-        return None
