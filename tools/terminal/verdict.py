@@ -12,6 +12,7 @@ from safety.faults import FAULTS
 VERDICTS = {
     0: "done",
     1: "error",
+    2: "refused",
     4: "not ready",
     5: "safety stop",
     6: "contact lost",
