@@ -268,6 +268,10 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     """The `Latch` that came first, 0: none."""
     published_ns: int = 0
     """When this record was written."""
+    travel_m: float = 0.0
+    """How far the base has travelled since the run's first motion: as sent or as measured, whichever is more."""
+    moving_s: float = 0.0
+    """How long it has moved since then."""
     object_pose: Pose2D = Pose2D(_NAN, _NAN, _NAN)
     """The newest usable pose of the pushed object, where motion capture sees it: for the workspace only."""
     object_received_ns: int = 0

@@ -175,6 +175,16 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     end_lateral_m: float = 0.0
     residual_N: float = float("nan")
     """Force left after the run, out of contact; NaN when it was not checked."""
+    lost_count: int = 0
+    """How often the contact was lost after it was first found."""
+    lost_m: float = 0.0
+    """Distance travelled without the contact, as odometry measured it, since it was first found."""
+    lost_ns: int = 0
+    """Time in motion without the contact since it was first found."""
+    early_contact: bool = False
+    """Whether the first contact came more than 0.3 m, and half of the way, before it was expected."""
+    force_before_contact_N: float = float("nan")
+    """Size of the mean force in the half second before the first contact, where it should be 0; NaN before it."""
 
 
 class WorkspaceState(msgspec.Struct, frozen=True, gc=False):

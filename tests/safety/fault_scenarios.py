@@ -310,6 +310,8 @@ SCENARIOS = [
     Scenario("F67", "latched", base(latched=True, latch_cause=1)),
     Scenario("F67", "gone", host(gate_alive=False)),
     Scenario("F67-late", "frozen", old("base", "published_ns")),
+    Scenario("F47", "further than it can need", base(latched=True, latch_cause=14, travel_m=9.0)),
+    Scenario("F48", "longer than it can need", base(latched=True, latch_cause=15, moving_s=900.0)),
     # --- force and task
     Scenario("F50-slow", "pressed", pressed(101.0)),
     Scenario("F50-stop", "pressed", pressed(151.0)),
