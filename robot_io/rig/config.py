@@ -213,7 +213,6 @@ class RigConfig(Table, frozen=True):
     path: PathConfig = PathConfig()
     sliders: SlidersConfig = SlidersConfig()
     control: ControlConfig = ControlConfig()
-    goal: GoalConfig = GoalConfig()
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
     world: WorldConfig = WorldConfig()
