@@ -9,6 +9,7 @@ import select
 import signal
 import socket
 import sys
+import time
 
 import msgspec
 
@@ -29,8 +30,10 @@ from tools.run.run_state import initial_state, status_line
 from tools.run.tick_core import TickCore
 
 PRIORITY = 80
-VERDICT_WITHIN_S = 60.0
-"""How long a blocked launcher (a stopped terminal) may take to read the result; the base is already at rest."""
+VERDICT_WITHIN_S = 3.0
+"""How long a launcher on a busy machine may take to read the result; the base is already at rest."""
+LAUNCHER_SILENT_S = 2.0
+"""A launcher that was silent for this long before the start is frozen, and nobody holds the operator's keys."""
 
 
 class DriverWarnings(logging.Handler):
@@ -107,11 +110,16 @@ def main() -> int:
 def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
     """Return whether the launcher lets the loop start; keep the sensor drained while waiting."""
     os.set_blocking(operator_fd, False)
-    while True:
+    heard_s = time.monotonic()
+    while time.monotonic() - heard_s < LAUNCHER_SILENT_S:
         readable, _, _ = select.select([operator_fd], [], [], 0.05)
         sensor.drain()
         if readable:
-            return os.read(operator_fd, 1) == b"G"
+            heard_s = time.monotonic()
+            key = os.read(operator_fd, 1)
+            if key != b"H":
+                return key == b"G"
+    return False
 
 
 def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float) -> int:
