@@ -16,7 +16,7 @@ import msgspec
 from control.loop import ControlLoop, Watch
 from control.run_notes import outcome
 from robot_io.driver import Sensor
-from robot_io.errors import PushError
+from robot_io.errors import EnvironmentFault, PushError
 from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
@@ -92,7 +92,7 @@ def main() -> int:
         sensor.close()
         raise
     status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
-    if not _wait_for_go(job.operator_fd, sensor):
+    if not _wait_for_go(job.operator_fd, sensor, status):
         base.close()
         sensor.stop()
         sensor.close()
@@ -107,7 +107,7 @@ def main() -> int:
     return _finish(loop, sensor, status, rig.loop.rate_hz)
 
 
-def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
+def _wait_for_go(operator_fd: int, sensor: Sensor, status: StatusPipe) -> bool:
     """Return whether the launcher lets the loop start; keep the sensor drained while waiting."""
     os.set_blocking(operator_fd, False)
     heard_s = time.monotonic()
@@ -119,6 +119,8 @@ def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
             key = os.read(operator_fd, 1)
             if key != b"H":
                 return key == b"G"
+    frozen = f"the launcher was frozen for {LAUNCHER_SILENT_S:g} s before the start; nothing has moved"
+    status.error(EnvironmentFault(frozen, do="Start again"))
     return False
 
 

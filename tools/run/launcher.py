@@ -251,6 +251,8 @@ class Launcher:
             if figures["error"]:
                 self.notes.append(f"{figures['error']}; this is a bug, its traceback is in {control.save_stderr()}")
             return figures
+        if control.errors:
+            raise control.errors[-1]
         if self._killed_by_operator:
             code, how = OperatorStop.exit_code, "was killed by the operator"
         elif control.process.returncode < 0:
