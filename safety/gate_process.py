@@ -13,6 +13,8 @@ import gc
 import signal
 import socket
 import sys
+from collections.abc import Callable
+from typing import TypeVar
 
 import msgspec
 from msgspec.structs import astuple, replace
@@ -31,6 +33,7 @@ from robot_io.log.gate_log import GateLog
 from robot_io.rig.config import BaseConfig, FramesConfig
 from safety.envelope import EnvelopeLimits
 from safety.gate_shell import GateShell
+from safety.motion_bounds import TravelLimits
 
 PRIORITY = 82
 CLOCK_NS = 2 * NS_PER_MS
@@ -45,12 +48,16 @@ class GateJob(msgspec.Struct, frozen=True):
     kind_folder: str
     """Further folders in which to look for the module of the base's kind."""
     limits: EnvelopeLimits
+    bounds: TravelLimits
     control_fd: int
     record_fd: int
     ring_fd: int
     status_fd: int
     wall_offset_ns: int
     """Wall clock minus CLOCK_MONOTONIC, for stamps in the log."""
+
+
+JobT = TypeVar("JobT", bound=GateJob)
 
 
 class GateProcess:
@@ -63,7 +70,7 @@ class GateProcess:
         self._control.setblocking(False)
         self._record_out = TypedRecord(job.record_fd, BASE_RECORD)
         self._log = GateLog(Ring(job.ring_fd).push, job.wall_offset_ns)
-        self._shell = GateShell(job.limits, monotonic_ns())
+        self._shell = GateShell(job.limits, job.bounds, monotonic_ns())
         self._loop = EventLoop()
 
     def run(self) -> None:
@@ -159,12 +166,15 @@ class GateProcess:
         self._record_out.publish(self._shell.record)
 
 
-def main() -> int:
-    """Run the gate; return 0, or the error's exit code when the base could not be opened."""
+def main(kind: type[JobT], wrapped: Callable[[Base, JobT], Base]) -> int:
+    """Run the gate; return 0, or the error's exit code when the base could not be opened.
+
+    kind: the job on stdin. wrapped: makes of the driver what the gate uses, when it has been opened.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # only control's EOF ends the gate
     set_timer_slack_1ns()
-    job = msgspec.json.decode(sys.stdin.buffer.read(), type=GateJob)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=kind)
     status = StatusPipe(job.status_fd)
     try:
         base: Base = build_driver(
@@ -183,7 +193,7 @@ def main() -> int:
     except PushError as error:  # the process ends, which closes everything that was open
         status.error(error)
         return error.exit_code
-    process = GateProcess(job, base, status)
+    process = GateProcess(job, wrapped(base, job), status)
     realtime = try_realtime(PRIORITY)
     status.say("ready", info=msgspec.to_builtins(info), realtime=realtime)
     gc.collect()
@@ -194,4 +204,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(GateJob, lambda base, _job: base))

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from robot_io.errors import ConfigError
 from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.fault_words import parse_fault
 from robot_io.rig.types import Matrix3
 from tools.kinds import is_shipped, query_kinds
 
@@ -26,7 +27,8 @@ def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigC
     from safety import limits
 
     rig, problems = _with_kinds(load_rig(name_or_path, overrides), folder_of(name_or_path))
-    problems += _name_problems(rig) + _level_problems(rig) + _address_problems(rig)
+    problems += _name_problems(rig) + _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
+    check_faults(rig)
     if not is_rotation(rig.frames.base_from_sensor):
         problems.append("`frames.base_from_sensor` is not a rotation (orthonormal rows, determinant +1)")
     if problems:
@@ -72,6 +74,32 @@ def devices_at(rig: RigConfig, level: str) -> list[str]:
     """Return which of the devices ft, arm and base are at `level` (sim, emulated or hardware)."""
     levels = {"ft": rig.ft.level, "arm": rig.arm.level, "base": rig.base.level}
     return [device for device, its_level in levels.items() if its_level == level]
+
+
+def with_faults(rig: RigConfig, words: Sequence[str]) -> RigConfig:
+    """Return the rig with more faults to inject. Raises ConfigError as `check_faults`."""
+    rig = replace(rig, faults=replace(rig.faults, inject=(*rig.faults.inject, *words)))
+    check_faults(rig)
+    return rig
+
+
+def check_faults(rig: RigConfig) -> None:
+    """Raise ConfigError for a fault to inject that cannot be read, or where a device is real."""
+    for word in rig.faults.inject:
+        parse_fault(word)
+    real = devices_at(rig, "hardware")
+    if rig.faults.inject and real:
+        raise ConfigError(
+            f"no fault is injected where a device is real, and {' and '.join(real)} "
+            f"{'is' if len(real) == 1 else 'are'} at level hardware",
+            where=f"rig {rig.name!r}",
+            do="Inject faults at level sim or emulated",
+        )
+
+
+def faults_of(rig: RigConfig, device: str) -> tuple[str, ...]:
+    """Return the faults to inject into a device: ft, arm or base."""
+    return tuple(word for word in rig.faults.inject if parse_fault(word).device.split(".")[0] == device)
 
 
 def is_rotation(rows: Matrix3) -> bool:
