@@ -245,6 +245,7 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
             f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Free some space"
         ) from None
     live.end()
+    live.close()
     save_tare(rig, figures)
     summary = verdict.summary(
         rig,
