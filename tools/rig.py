@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from robot_io.rig.types import Matrix3
 from tools.kinds import is_shipped, query_kinds
 
 ROTATION_TOLERANCE = 1e-6
+LONGEST_NAME = 64
 
 
 def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
@@ -25,7 +27,7 @@ def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigC
     from safety import limits
 
     rig, problems = _with_kinds(load_rig(name_or_path, overrides), folder_of(name_or_path))
-    problems += _level_problems(rig) + _address_problems(rig)
+    problems += _name_problems(rig) + _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
     check_faults(rig)
     if not is_rotation(rig.frames.base_from_sensor):
         problems.append("`frames.base_from_sensor` is not a rotation (orthonormal rows, determinant +1)")
@@ -114,6 +116,16 @@ def is_rotation(rows: Matrix3) -> bool:
     return orthonormal and determinant > 0
 
 
+def _name_problems(rig: RigConfig) -> list[str]:
+    """A rig's name becomes part of the names of folders and files."""
+    if re.fullmatch(r"\w[\w .+-]*", rig.name) and len(rig.name) <= LONGEST_NAME:
+        return []
+    return [
+        f"`name` = {rig.name!r} is not a name: letters, digits, spaces and the signs - + . _ are, "
+        f"at most {LONGEST_NAME} of them, the first a letter or a digit"
+    ]
+
+
 def _level_problems(rig: RigConfig) -> list[str]:
     simulated = devices_at(rig, "sim")
     if len(simulated) in (0, 3):
@@ -134,6 +146,6 @@ def _address_problems(rig: RigConfig) -> list[str]:
         for key, address in addresses.items()
         if not address and key.split(".")[0] in shipped
     ]
-    if "base" in shipped and rig.base.url and not rig.base.url.startswith("ws://"):
-        problems.append(f"`base.url` = {rig.base.url!r} does not start with ws://")
+    if "base" in shipped and rig.base.url and not rig.base.url.startswith(("ws://", "wss://")):
+        problems.append(f"`base.url` = {rig.base.url!r} does not start with ws:// or wss://")
     return problems

@@ -13,8 +13,8 @@ from robot_io.tick import TickInput, TickOutput, TickState
 from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
 from tools.places.atomic_file import write_json
+from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
-from tools.places.state_dir import RigLock
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
 from tools.run.run_facts import level_of
@@ -22,6 +22,8 @@ from tools.run.run_state import status_line
 from tools.terminal import verdict
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.verdict.object_pose import object_pose
+from tools.verdict.witness import Witness
 
 MAX_SEED = 2**63 - 1
 """The largest integer that the log can hold."""
@@ -67,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     simulated = bool(devices_at(rig, "sim"))
     if not simulated:
         print_levels(rig)
-    with RigLock(rig.name) if not simulated else _NoLock():
+    with DeviceLocks(rig):
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
@@ -175,6 +177,8 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         level=level_of(rig),
         devices=launcher.devices(figures),
         notes=launcher.notes,
+        witness=launcher.witness(figures),
+        pushed=launcher.pushed(),
     )
     return with_injected(summary, launcher.injected(figures))
 
@@ -223,6 +227,8 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         level="sim",
         devices=figures["devices"],
         notes=[],
+        witness=Witness(),
+        pushed=object_pose(rig.path, log.object_poses),
     )
     return with_injected(summary, figures["injected"])
 
@@ -266,11 +272,3 @@ def write_report(summary: dict[str, Any], out: Path, ready: ReportProcess | None
         tell(f"no report: {reason}; `push report {out}` makes one from the log")
     else:
         summary["report"] = str(out / "report.html")
-
-
-class _NoLock:
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, *_: object) -> None:
-        return None

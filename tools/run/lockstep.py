@@ -24,6 +24,7 @@ from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.fault_words import FaultWord
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety.gate_shell import GateShell
+from safety.motion_bounds import total_bounds
 from sim_backend.injection.arm import InjectedArm
 from sim_backend.injection.base import InjectedBase
 from sim_backend.injection.event import event_writer
@@ -91,7 +92,7 @@ class Lockstep:
         self._base_edge = InjectedBase(self._base, self.injection)
         self._core = TickCore.of(rig, in_contact=saved is not None)
         self._state = initial_state(saved)
-        self._gate = GateShell(self._core.safety.envelope, START_NS)
+        self._gate = GateShell(self._core.safety.envelope, total_bounds(rig), START_NS)
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
         self.notes = RunNotes()
         self.operator = Operator.NONE
@@ -122,8 +123,7 @@ class Lockstep:
         return {
             **outcome(inp, self._state, output),
             "loop": {"rate_hz": self.rig.loop.rate_hz, "ticks": tick + 1, "skipped": 0},
-            "events": self.notes.events,
-            "fault_counts": self.notes.fault_counts,
+            **self.notes.figures(),
             "devices": counters,
             "injected": self.injection.counts(),
         }
@@ -155,7 +155,7 @@ class Lockstep:
         message = tick_message(inp, self._state, after, output)
         self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
         self._state = after
-        self.notes.note(inp, output)
+        self.notes.note(inp, after, output)
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
         """Pass the command through the gate, as the gate process does."""
