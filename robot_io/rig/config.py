@@ -215,6 +215,7 @@ class RigConfig(Table, frozen=True):
     control: ControlConfig = ControlConfig()
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
+    goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()
 

@@ -47,8 +47,10 @@ def gather(rig: RigConfig, figures: dict[str, Any], witness: Witness) -> list[Tr
     ]
     if witness.gate:
         items.append(_item("gate", "against", witness.gate))
-    if any(fault.startswith(LAUNCHER) for fault in figures["fault_counts"]):
-        items.append(_item("launcher", "against", "the launcher fell silent during the run"))
+    if any(fault.startswith(LAUNCHER) for fault in figures["faults"]):
+        items.append(_item("launcher", "against", "the launcher was silent when the run ended"))
+    elif any(fault.startswith(LAUNCHER) for fault in figures["fault_counts"]):
+        items.append(_item("launcher", "unknown", "the launcher was silent for a while: no key would have been heard"))
     if witness.unanswered is not None:
         items.append(_preflight(witness.unanswered))
     if rig.base.pose_source == "odometry":

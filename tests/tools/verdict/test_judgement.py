@@ -19,6 +19,7 @@ GOOD = {
     "force_before_contact_N": 0.3,
     "residual_N": 0.4,
     "log_dropped": 0,
+    "faults": [],
     "fault_counts": {},
 }
 
@@ -83,7 +84,7 @@ def test_a_push_that_starts_further_off_may_end_as_far_off():
         ({"force_before_contact_N": 3.01}, "force_before_contact"),
         ({"force_before_contact_N": None}, None),
         ({"log_dropped": 1}, "log_dropped"),
-        ({"fault_counts": {"F73-hold": 1}}, "launcher"),
+        ({"faults": ["F73-hold"], "fault_counts": {"F73-hold": 1}}, "launcher"),
     ],
 )
 def test_what_makes_a_run_untrustworthy(figures, id_):
@@ -124,6 +125,7 @@ def unknown(*overrides, witness=None, **figures):
 def test_what_is_not_known_speaks_neither_for_nor_against():
     assert unknown() == []
     assert unknown(residual_N=None) == ["residual"]
+    assert unknown(fault_counts={"F73-hold": 2}) == ["launcher"]
     assert unknown(witness=Witness(unanswered=2)) == ["preflight"]
     assert unknown("base.pose_source=odometry") == ["pose"]
     assert unknown(start_lateral_m=None, worst_lateral_m=None, distance_m=0.0) == ["corridor", "end"]
