@@ -36,6 +36,8 @@ from safety.motion_bounds import TravelLimits
 PRIORITY = 82
 CLOCK_NS = 2 * NS_PER_MS
 """How often silence is judged and repeats are sent."""
+MOST_FRAMES = 200
+"""Frames of control read before they are judged: two seconds of them, more than a gate in order ever lets wait."""
 
 
 class GateJob(msgspec.Struct, frozen=True):
@@ -105,11 +107,11 @@ class GateProcess:
             self._loop.stop()
 
     def _read_control(self) -> None:
-        """Read every waiting frame, before silence is judged."""
+        """Read the waiting frames, before silence is judged."""
         began_ns = monotonic_ns()
         frames: list[GateFrame | None] = []
         gone = bool(self._shell.zeros_since_ns)
-        while not gone:
+        while not gone and len(frames) < MOST_FRAMES:
             try:
                 payload = self._control.recv(FRAME_BYTES + 1)
             except BlockingIOError:

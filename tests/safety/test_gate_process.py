@@ -112,9 +112,10 @@ def test_a_gate_that_was_frozen_lets_nothing_out_whatever_wakes_it_first(rig, wa
     rig.frame(SLOW)
     rig.gate._on_control(0)
     assert rig.base.told == [SLOW]
-    rig.wait_ms(101)
     for _ in range(3):
+        rig.wait_ms(33)
         rig.frame(SLOW)
+    rig.wait_ms(2)
     getattr(rig.gate, wake)(0)
     assert rig.base.told[1:] == [ZERO]
     assert rig.record().latch_cause == Latch.PAUSED
