@@ -204,7 +204,7 @@ class ControlLoop:
         self._ring.push(Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, before, after, output)))
         self._state = after
         self.last = (inp, after, output)
-        self.notes.note(inp, output)
+        self.notes.note(inp, after, output)
         if inp.tick % self._status_every == 0 or output.finished:
             self._on_status(inp, after, output)
         if output.finished:
@@ -237,7 +237,7 @@ class ControlLoop:
             Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, failed, before, after, output))
         )
         self.last = (failed, after, output)
-        self.notes.note(failed, output)
+        self.notes.note(failed, after, output)
 
     def _input(self, now_ns: int, late_ns: int, skipped: int) -> TickInput:
         gone = self._watch.gone

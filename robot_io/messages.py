@@ -171,7 +171,7 @@ class BaseReport(msgspec.Struct, frozen=True, gc=False, tag=True):
 
 
 class SliderPose(msgspec.Struct, frozen=True, gc=False, tag=True):
-    """Pose of the pushed object in the WORLD frame, from motion capture: for the log, never for control."""
+    """Pose of the pushed object in the WORLD frame, from motion capture: for log and workspace, never for control."""
 
     pose: Pose2D
     flaw: str = ""
@@ -272,6 +272,9 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     """How far the base has travelled since the run's first motion: as sent or as measured, whichever is more."""
     moving_s: float = 0.0
     """How long it has moved since then."""
+    object_pose: Pose2D = Pose2D(_NAN, _NAN, _NAN)
+    """The newest usable pose of the pushed object, where motion capture sees it: for the workspace only."""
+    object_received_ns: int = 0
 
 
 NO_BASE = BaseRecord()

@@ -13,6 +13,8 @@ import gc
 import signal
 import socket
 import sys
+from collections.abc import Callable
+from typing import TypeVar
 
 import msgspec
 from msgspec.structs import astuple, replace
@@ -55,6 +57,9 @@ class GateJob(msgspec.Struct, frozen=True):
     status_fd: int
     wall_offset_ns: int
     """Wall clock minus CLOCK_MONOTONIC, for stamps in the log."""
+
+
+JobT = TypeVar("JobT", bound=GateJob)
 
 
 class GateProcess:
@@ -163,12 +168,15 @@ class GateProcess:
         self._record_out.publish(self._shell.record)
 
 
-def main() -> int:
-    """Run the gate; return 0, or the error's exit code when the base could not be opened."""
+def main(kind: type[JobT], wrapped: Callable[[Base, JobT], Base]) -> int:
+    """Run the gate; return 0, or the error's exit code when the base could not be opened.
+
+    kind: the job on stdin. wrapped: makes of the driver what the gate uses, when it has been opened.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # only control's EOF ends the gate
     set_timer_slack_1ns()
-    job = msgspec.json.decode(sys.stdin.buffer.read(), type=GateJob)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=kind)
     status = StatusPipe(job.status_fd)
     try:
         base: Base = build_driver(
@@ -187,7 +195,7 @@ def main() -> int:
     except PushError as error:  # the process ends, which closes everything that was open
         status.error(error)
         return error.exit_code
-    process = GateProcess(job, base, status)
+    process = GateProcess(job, wrapped(base, job), status)
     realtime = try_realtime(PRIORITY)
     status.say("ready", info=msgspec.to_builtins(info), realtime=realtime)
     gc.collect()
@@ -198,4 +206,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(GateJob, lambda base, _job: base))

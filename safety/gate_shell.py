@@ -28,6 +28,7 @@ from robot_io.messages import (
     BodyTwist,
     DeviceHealth,
     LinkState,
+    SliderPose,
     Stamped,
 )
 from safety import gate
@@ -107,7 +108,9 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
                 travel = travel.on_speed(value.twist, at_ns)
             elif isinstance(value, BaseReport):
                 changes.update(status=value.status, status_received_ns=at_ns)
-            # The object's pose is only logged; the echo of our own commands is for the driver.
+            elif isinstance(value, SliderPose) and not value.flaw:
+                changes.update(object_pose=value.pose, object_received_ns=at_ns)
+            # The echo of our own commands is for the driver.
         if not changes:
             return self
         record = replace(self.record, pose_seq=pose_seq, odometry_seq=odometry_seq, **changes)

@@ -11,6 +11,7 @@ from robot_io.rig.config import FtConfig, RigConfig
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
 from safety.motion_bounds import total_bounds
+from safety.workspace import WorkspaceSettings
 
 SATURATED = 0.95
 """Share of the sensor's range."""
@@ -44,6 +45,7 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     total_travel: float
     total_moving: float
     """What the whole run can need, m and s; the gate latches beyond it."""
+    workspace: WorkspaceSettings
 
     @classmethod
     def of(cls, rig: RigConfig) -> SafetySettings:
@@ -80,6 +82,7 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
             ),
             bounds.distance_m,
             bounds.moving_s,
+            WorkspaceSettings.of(rig),
         )
 
 

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Mode, Phase, SafetyState, TickInput
-from safety import arm_checks, base_checks, host_checks, sensor_checks, task_checks
+from safety import arm_checks, base_checks, host_checks, sensor_checks, task_checks, workspace_checks
 from safety.faults import FAULTS, Clears, strongest
 from safety.finding import value_of
 from safety.settings import SafetySettings
@@ -72,6 +72,7 @@ def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
     latched = tuple(dict.fromkeys([*state.latched, "F68"]))
     mode = max(Mode(state.mode), FAULTS["F68"].mode)
     state = replace(state, mode=int(mode), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
+    state = _note_first(state, ["F68"], inp.now_ns)
     return state, Verdict(mode, latched, (math.nan,) * len(latched), True, FAULTS["F68"].exit_code)
 
 
@@ -114,7 +115,7 @@ def _gather(
         faults.append("F36")
     if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has sent no data is not a fault
         return sensor_checks.note(state, inp), faults
-    for check in (sensor_checks.check, arm_checks.check, base_checks.check):
+    for check in (sensor_checks.check, arm_checks.check, base_checks.check, workspace_checks.check):
         state, found = check(settings, state, inp, control)
         faults += found
     return state, faults

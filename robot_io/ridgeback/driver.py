@@ -29,6 +29,7 @@ from robot_io.messages import (
 from robot_io.ridgeback.echo_watch import EchoWatch
 from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
 from robot_io.ridgeback.intake import Intake
+from robot_io.ridgeback.open_socket import parse_url
 from robot_io.ridgeback.pending import PendingSamples
 from robot_io.ridgeback.preflight import check_topics
 from robot_io.ridgeback.rosbridge_codec import (
@@ -38,7 +39,7 @@ from robot_io.ridgeback.rosbridge_codec import (
     encode_twist,
     spell_type,
 )
-from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink, parse_url
+from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink
 from robot_io.rig.topics import TopicsConfig
 
 PoseSource = Literal["mocap", "odometry", "joint_states"]
@@ -58,7 +59,7 @@ ZERO = BodyTwist()
 class Ridgeback(DriverBase):
     """A Ridgeback behind rosbridge: takes velocities (m/s, rad/s, BODY frame), gives pose, odometry and status.
 
-    url: `ws://host:port` of the bridge; `wss` is not supported.
+    url: `ws://host:port` of the bridge, or `wss://...` for an encrypted one, whose certificate is checked.
     topics: names and types of the base's ROS topics.
     pose_source: which topic says where the base is: `"mocap"`, `"odometry"` or `"joint_states"`.
     base_from_marker: x (m), y (m), yaw (rad) of the motion capture's marker frame in the BODY frame.
@@ -116,10 +117,11 @@ class Ridgeback(DriverBase):
         return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
-        """Connect, check topics, advertise, subscribe; at most 3.5 s. Nothing is commanded.
+        """Connect, check topics, advertise, subscribe; at most 6 s. Nothing is commanded.
 
-        Raises DeviceUnreachable (nothing listens, no handshake, the link broke), DeviceProtocolError (no bridge, wrong
-        message type) or DeviceNotReady (nobody listens to the command topic).
+        Raises DeviceUnreachable (unknown name, nothing listens, no handshake, the link broke), DeviceProtocolError (no
+        bridge, a certificate that is not trusted, wrong message type) or DeviceNotReady (nobody listens to the
+        command topic).
         """
         self.close()
         self._reset()

@@ -10,20 +10,20 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
+import ssl
 import struct
 import time
 
 from websockets.client import ClientProtocol
-from websockets.exceptions import InvalidHandshake, InvalidMessage, InvalidURI
+from websockets.exceptions import InvalidHandshake, InvalidMessage
 from websockets.frames import Frame, Opcode
 from websockets.http11 import Response
 from websockets.protocol import State
-from websockets.uri import WebSocketURI, parse_uri
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
-from robot_io.errors import ConfigError, DeviceError, DeviceProtocolError, DeviceUnreachable
+from robot_io.errors import DeviceError, DeviceProtocolError, DeviceUnreachable
+from robot_io.ridgeback.open_socket import START_THE_BRIDGE, open_socket, parse_url
 
-CONNECT_TIMEOUT_S = 1.0
 HANDSHAKE_TIMEOUT_S = 1.0
 CLOSE_TIMEOUT_S = 0.05
 SEND_BUFFER_BYTES = 16_384
@@ -33,34 +33,21 @@ MOST_FRAMES = 200
 """Frames read in one call ..."""
 READ_NS = 2 * NS_PER_MS
 """... and processor time of this thread that it may take."""
+WOULD_BLOCK = (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError)
+"""What a socket raises instead of waiting, plain or encrypted."""
 
 _RECEIVE_BYTES = 65_536
 _PARSED_BYTES = 256
 """Parsed between two looks at the bounds: at most 128 frames of two bytes, about a millisecond."""
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)
-_START_THE_BRIDGE = "Start rosbridge on the robot (roslaunch rosbridge_server rosbridge_websocket.launch)"
 
 
 class LinkLost(Exception):
     """The connection is gone or must be given up; the message is the cause."""
 
 
-def parse_url(url: str) -> WebSocketURI:
-    """Return the parts of `ws://host:port/`. Raises ConfigError for anything else."""
-    try:
-        uri = parse_uri(url)
-        uri.host.encode("idna")  # as looking it up does
-    except (InvalidURI, ValueError) as error:
-        raise ConfigError(
-            f"{url!r} is not a websocket address", where="base url", do="Write it as ws://192.168.131.1:9090"
-        ) from error
-    if uri.secure:
-        raise ConfigError("encrypted websockets (wss) are not supported", where=url, do="Use ws://")
-    return uri
-
-
 class WebSocketLink:
-    """A connected websocket; every method returns at once except `connect` (2 s) and `close` (0.05 s)."""
+    """A connected websocket; every method returns at once except `connect` (5 s) and `close` (0.05 s)."""
 
     def __init__(self, sock: socket.socket, protocol: ClientProtocol, clock: ClockNs) -> None:
         self._socket = sock
@@ -81,17 +68,7 @@ class WebSocketLink:
     def connect(cls, url: str, clock: ClockNs = monotonic_ns) -> WebSocketLink:
         """Connect and shake hands. Raises ConfigError, DeviceUnreachable or DeviceProtocolError."""
         uri = parse_url(url)
-        try:
-            sock = socket.create_connection((uri.host, uri.port), timeout=CONNECT_TIMEOUT_S)
-        except TimeoutError as error:
-            raise DeviceUnreachable(
-                f"no answer within {CONNECT_TIMEOUT_S:g} s",
-                where=url,
-                do="Check cable, address and that the base is on",
-            ) from error
-        except OSError as error:
-            why = error.strerror or str(error)
-            raise DeviceUnreachable(f"cannot connect ({why})", where=url, do=_START_THE_BRIDGE) from error
+        sock = open_socket(uri, url)
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
@@ -142,6 +119,8 @@ class WebSocketLink:
     def wait_readable(self, until_ns: int) -> bool:
         """Wait until something arrives; False once `until_ns` has passed, however much still comes."""
         left_ns = until_ns - self._clock()
+        if left_ns > 0 and isinstance(self._socket, ssl.SSLSocket) and self._socket.pending():
+            return True  # decrypted already: the descriptor does not show it
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
         return left_ns > 0 and bool(poll.poll(left_ns // 1_000_000))
@@ -176,14 +155,17 @@ class WebSocketLink:
                         where=url,
                         do="The bridge hangs, or something else is listening there; restart rosbridge",
                     )
-                data = self._socket.recv(_RECEIVE_BYTES)
+                try:
+                    data = self._socket.recv(_RECEIVE_BYTES)
+                except WOULD_BLOCK:  # part of an encrypted record
+                    continue
                 if data:
                     self._protocol.receive_data(data)
                 else:
                     self._protocol.receive_eof()
         except (OSError, LinkLost) as error:
             raise DeviceUnreachable(
-                f"connection lost during the handshake ({error})", where=url, do=_START_THE_BRIDGE
+                f"connection lost during the handshake ({error})", where=url, do=START_THE_BRIDGE
             ) from error
         if self._protocol.handshake_exc is not None:
             raise _not_a_bridge(url, self._protocol.handshake_exc) from self._protocol.handshake_exc
@@ -197,7 +179,7 @@ class WebSocketLink:
             return True
         try:
             data = self._socket.recv(_RECEIVE_BYTES)
-        except BlockingIOError:
+        except WOULD_BLOCK:
             return False
         except OSError as error:
             raise LinkLost(f"connection lost ({error.strerror or error})") from error
@@ -254,7 +236,7 @@ class WebSocketLink:
             return
         try:
             sent = self._socket.send(data)
-        except BlockingIOError as error:
+        except WOULD_BLOCK as error:
             raise LinkLost("the socket accepts no more data: the bridge is not reading") from error
         except OSError as error:
             raise LinkLost(f"sending failed ({error.strerror or error})") from error

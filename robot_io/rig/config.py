@@ -21,6 +21,7 @@ from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.task import GoalConfig, WorkspaceConfig
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
 from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
@@ -90,10 +91,14 @@ class BaseConfig(Table, frozen=True):
     """A shipped kind, or `package.module:Class`."""
     level: Level = "emulated"
     url: str = ""
+    """`ws://host:port` of rosbridge, or `wss://host:port`: then its certificate is checked against the system's store,
+    or the file that the environment variable SSL_CERT_FILE names."""
     pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
     """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
     """How often poses come: late after 3 periods, at least 50 ms, and lost after 6, at least 120 ms (F40)."""
+    outline_m: tuple[Positive, Positive] = (0.960, 0.793)
+    """Length and width about its centre, for the workspace; by default a Ridgeback's (data sheet of May 2025)."""
     options: Options = msgspec.field(default_factory=dict)
     """What the kind itself understands."""
     topics: TopicsConfig = TopicsConfig()
@@ -188,6 +193,13 @@ class LimitsConfig(Table, frozen=True):
     """... and at which it stops (F20)."""
 
 
+class FaultsConfig(Table, frozen=True):
+    """Faults to inject at levels sim and emulated, for rehearsals and tests (docs/faults.md)."""
+
+    inject: tuple[str, ...] = ()
+    """Each `DEVICE.KIND[=VALUE] at T s [for T s]`, as after `push run --fault`."""
+
+
 class RigConfig(Table, frozen=True):
     """One robot, real or not: its devices, frames, path, gains, limits and, where simulated, its world."""
 
@@ -201,8 +213,11 @@ class RigConfig(Table, frozen=True):
     path: PathConfig = PathConfig()
     sliders: SlidersConfig = SlidersConfig()
     control: ControlConfig = ControlConfig()
+    goal: GoalConfig = GoalConfig()
     limits: LimitsConfig = LimitsConfig()
+    workspace: WorkspaceConfig = WorkspaceConfig()
     world: WorldConfig = WorldConfig()
+    faults: FaultsConfig = FaultsConfig()
 
 
 def shipped_rigs() -> list[str]:

@@ -120,6 +120,8 @@ def test_what_the_base_says_is_in_the_record():
         odometry_seq=1,
         status=BaseStatus(False, True, 26.5),
         status_received_ns=T0 + 6 * MS,
+        object_pose=Pose2D(9.0, 9.0, 0.0),
+        object_received_ns=T0 + 3 * MS,
     )
     assert NEW.on_samples([heard(CommandEcho(SLOW), 1)]) == NEW
     assert NEW.on_samples([heard(BasePose(Pose2D(1.0, 2.0, 0.5)), 1)]).record.pose_valid

@@ -13,7 +13,8 @@ from websockets.protocol import State
 
 from robot_io.messages import BodyTwist, LinkState
 from robot_io.ridgeback.driver import Ridgeback
-from robot_io.ridgeback.websocket_link import WebSocketLink, parse_url
+from robot_io.ridgeback.open_socket import parse_url
+from robot_io.ridgeback.websocket_link import WebSocketLink
 from tests.robot_io.ridgeback.test_websocket_link import PING, TEXT, frame
 from tests.wire.bridge_process import until
 

@@ -13,15 +13,17 @@ from robot_io.tick import TickInput, TickOutput, TickState
 from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
 from tools.places.atomic_file import write_json
+from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
-from tools.places.state_dir import RigLock
 from tools.report.process import ReportProcess
-from tools.rig import devices_at, folder_of, resolve_rig
+from tools.rig import devices_at, folder_of, resolve_rig, with_faults
 from tools.run.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.verdict.object_pose import object_pose
+from tools.verdict.witness import Witness
 
 MAX_SEED = 2**63 - 1
 """The largest integer that the log can hold."""
@@ -37,6 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of the simulated world (0)")
     parser.add_argument("--out", help="folder for the run, created (default: runs/RIG-TIME)")
     parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
+    parser.add_argument(
+        "--fault",
+        dest="faults",
+        action="append",
+        default=[],
+        metavar="WORDS",
+        help='inject a fault, at levels sim and emulated: "ft.frozen at 3 s for 1 s"',
+    )
     parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
     parser.add_argument(
         "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
@@ -49,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Push; return the run's exit code. Raises PushError if the run could not start."""
-    rig = resolve_rig(args.rig, overrides(args))
+    rig = with_faults(resolve_rig(args.rig, overrides(args)), args.faults)
     check_flags(args, rig)
     if warning := gain_warning(rig):
         tell(warning)
@@ -59,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     simulated = bool(devices_at(rig, "sim"))
     if not simulated:
         print_levels(rig)
-    with RigLock(rig.name) if not simulated else _NoLock():
+    with DeviceLocks(rig):
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
@@ -73,11 +83,18 @@ def run(args: argparse.Namespace) -> int:
     if not args.no_report:
         write_report(summary, out, early)
         write_summary(summary, out)
+    unused = unused_faults(summary)
     with ignoring_output_errors():
         for line in verdict.person_lines(summary):
             tell(line) if args.json else print(line)
-        if args.json:
+        if args.json and not unused:
             say_json(summary)
+    if unused:
+        raise UsageError(
+            f"the fault `{unused[0]}` changed nothing",
+            where="push run",
+            do=f"Choose a time within the run; what came of the run is in {out}",
+        )
     return int(summary["exit_code"])
 
 
@@ -151,7 +168,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
             run_dir.discard(out)
         raise
     save_tare(rig, figures)
-    return verdict.summary(
+    summary = verdict.summary(
         rig,
         figures,
         out=out,
@@ -160,7 +177,10 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         level=level_of(rig),
         devices=launcher.devices(figures),
         notes=launcher.notes,
+        witness=launcher.witness(figures),
+        pushed=launcher.pushed(),
     )
+    return with_injected(summary, launcher.injected(figures))
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
@@ -168,7 +188,7 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
     from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
     text = run_dir.write_config(out, rig)
-    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, faults=rig.faults.inject)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved)
     except PushError:  # an impossible world: nothing has started
@@ -198,7 +218,7 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         ) from None
     live.end()
     save_tare(rig, figures)
-    return verdict.summary(
+    summary = verdict.summary(
         rig,
         figures,
         out=out,
@@ -207,7 +227,20 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         level="sim",
         devices=figures["devices"],
         notes=[],
+        witness=Witness(),
+        pushed=object_pose(rig.path, log.object_poses),
     )
+    return with_injected(summary, figures["injected"])
+
+
+def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
+    """Return the summary and, if faults were injected, how many samples each has changed."""
+    return summary | {"injected": counts} if counts else summary
+
+
+def unused_faults(summary: dict[str, Any]) -> list[str]:
+    """Return the faults to inject that changed nothing."""
+    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]
 
 
 def save_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
@@ -239,11 +272,3 @@ def write_report(summary: dict[str, Any], out: Path, ready: ReportProcess | None
         tell(f"no report: {reason}; `push report {out}` makes one from the log")
     else:
         summary["report"] = str(out / "report.html")
-
-
-class _NoLock:
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, *_: object) -> None:
-        return None

@@ -14,6 +14,7 @@ import msgspec
 
 from control.loop import ControlLoop, Watch
 from control.run_notes import outcome
+from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.driver import Sensor
 from robot_io.errors import PushError
 from robot_io.ipc.gate_link import GateLink
@@ -23,6 +24,10 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
 from robot_io.rig.config import rig_from_toml
 from robot_io.ur10.driver import ArmLink
+from sim_backend.injection.arm import InjectedArm
+from sim_backend.injection.event import event_writer
+from sim_backend.injection.injection import Injection
+from sim_backend.injection.sensor import InjectedSensor
 from tools.kinds import name_of
 from tools.run.jobs import ControlJob
 from tools.run.run_state import initial_state, status_line
@@ -60,6 +65,8 @@ def main() -> int:
     except PushError as error:
         status.error(error)
         return error.exit_code
+    ring = Ring(job.ring_fd)
+    injection = Injection(rig.faults.inject, monotonic_ns, event_writer(ring.push, job.wall_offset_ns))
     core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = GateLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
@@ -69,10 +76,10 @@ def main() -> int:
         initial_state(job.saved_tare),
         rate_hz=rig.loop.rate_hz,
         sensor_rate_hz=rig.ft.declared.rate_hz,
-        sensor=sensor,
-        arm=arm,
+        sensor=InjectedSensor(sensor, injection, rig) if injection.of("ft") else sensor,
+        arm=InjectedArm(arm, injection) if injection.of("arm") else arm,
         base=base,
-        ring=Ring(job.ring_fd),
+        ring=ring,
         watch=watch,
         operator_fd=job.operator_fd,
         on_status=lambda inp, state, output: status.say("status", **status_line(inp, state, output)),
@@ -98,10 +105,11 @@ def main() -> int:
     gc.freeze()
     gc.disable()
     lock_memory()
+    injection.begin(monotonic_ns() + round(NS_PER_S / rig.loop.rate_hz))
     loop.run()
     base.close()  # first: the gate reads the EOF as the end and sends its last zeros
     gc.enable()
-    return _finish(loop, sensor, status, rig.loop.rate_hz)
+    return _finish(loop, sensor, status, rig.loop.rate_hz, injection.counts("ft", "arm"))
 
 
 def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
@@ -114,7 +122,7 @@ def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
             return os.read(operator_fd, 1) == b"G"
 
 
-def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float) -> int:
+def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float, injected: dict[str, int]) -> int:
     counters = sensor.health().counters
     sensor.stop()
     sensor.close()
@@ -126,9 +134,9 @@ def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: floa
         "finished",
         **figures,
         loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns),
-        events=loop.notes.events,
-        fault_counts=loop.notes.fault_counts,
+        **loop.notes.figures(),
         ft=counters,
+        injected=injected,
         error="" if loop.error is None else f"{type(loop.error).__name__}: {loop.error}",
     )
     if loop.error is not None:

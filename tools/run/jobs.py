@@ -24,6 +24,8 @@ class ControlJob(msgspec.Struct, frozen=True):
     gate_pidfd: int
     arm_pidfd: int
     recorder_pidfd: int
+    wall_offset_ns: int
+    """Wall clock minus CLOCK_MONOTONIC, for stamps in the log."""
 
 
 class ArmKindJob(msgspec.Struct, frozen=True):

@@ -16,12 +16,16 @@ import os
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.errors import OperatorStop, PushError, SafetyStop
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import leave_realtime, try_realtime
 from robot_io.ipc.spawn import Child
+from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
+from robot_io.rig.fault_words import parse_fault
 from safety.gate import Latch
 from tools.kinds import name_of
 from tools.places import run_dir
@@ -32,6 +36,8 @@ from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
 from tools.terminal.start_errors import combined_error, start_timeout
+from tools.verdict.object_pose import ObjectPose, object_pose
+from tools.verdict.witness import Witness, witness_of
 
 PRIORITY = 1
 """Below all other processes of the run. Not for its work: a killed process needs processor time to die, and the
@@ -97,11 +103,34 @@ class Launcher:
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
         """Return the counters of the three drivers, by device name."""
+        counters, injected = self._finished_event("gate").get("counters", {}), self.injected(figures)
         return {
             name_of(self._rig.ft.kind): figures["ft"],
             name_of(self._rig.arm.kind): {"packets": figures["arm_packets"]},
-            name_of(self._rig.base.kind): self._finished_event("gate").get("counters", {}),
+            name_of(self._rig.base.kind): {k: n for k, n in counters.items() if k not in injected},
         }
+
+    def witness(self, figures: dict[str, Any]) -> Witness:
+        """Return what the other processes say of the run, once `run` has returned."""
+        recorder, gate = self._children["recorder"], self._children["gate"]
+        return witness_of(
+            self.log,
+            figures["loop"]["ticks"],
+            recorder=recorder.finished or f"the recorder process {recorder.how_it_ended()}",
+            gate=gate.finished or f"the gate process {gate.how_it_ended()}",
+        )
+
+    def pushed(self) -> ObjectPose | None:
+        """Return where the object is, once `run` has returned; None if that is not known."""
+        poses = self._finished_event("recorder").get("object_poses")
+        return object_pose(self._rig.path, msgspec.convert(poses, tuple[Pose2D, Pose2D] | None))
+
+    def injected(self, figures: dict[str, Any]) -> dict[str, int]:
+        """Return how many samples each injected fault changed, by its words; none for a process that did not say."""
+        by_gate: dict[str, int] = self._finished_event("gate").get("counters", {})
+        by_control: dict[str, int] = figures.get("injected", {})
+        words = {parse_fault(word).text for word in self._rig.faults.inject}
+        return by_control | {word: n for word, n in by_gate.items() if word in words}
 
     # --- start -----------------------------------------------------------------------------------------------
 

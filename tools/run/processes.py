@@ -23,7 +23,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 from robot_io.clock import wall_offset_ns
 from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
@@ -37,7 +37,8 @@ from safety.motion_bounds import total_bounds
 from safety.settings import SafetySettings
 from tools.kinds import is_shipped
 from tools.places.saved_tare import SavedTare
-from tools.rig import devices_at
+from tools.rig import devices_at, faults_of
+from tools.run.injected_gate import InjectedGateJob
 from tools.run.jobs import ArmKindJob, ControlJob, EmulatorJob
 from tools.run.recorder import Job as RecorderJob
 from tools.run.recorder import RingSource
@@ -153,7 +154,9 @@ class Processes:
         return rig
 
     def _start_recorder(self, config_text: str) -> None:
-        facts = run_facts(level_of(self._rig), self._seed, in_contact=self._saved is not None)
+        facts = run_facts(
+            level_of(self._rig), self._seed, in_contact=self._saved is not None, faults=self._rig.faults.inject
+        )
         facts["kernel"] = platform.release()
         rings = [RingSource(name, ring.fd) for name, ring in self._rings.items()]
         alive = [self._alive[name][0] for name in ("control", "gate", "world")]
@@ -167,7 +170,10 @@ class Processes:
         job = GateJob(
             rig.base, rig.frames, self._kind_folder, limits, bounds, control_fd, record_fd, ring_fd, -1, self._offset_ns
         )
-        self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
+        module = "safety.gate_process"
+        if faults := faults_of(rig, "base"):
+            job, module = InjectedGateJob(**asdict(job), faults=faults), "tools.run.injected_gate"
+        self._spawn("gate", module, job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
         if not is_shipped("arm", rig.arm.kind):
@@ -192,7 +198,10 @@ class Processes:
             ring_fd,
             operator_fd,
             -1,
-            *pidfds,
+            pidfds[0],
+            pidfds[1],
+            pidfds[2],
+            self._offset_ns,
         )
         fds = [gate_fd, base_fd, arm_fd, ring_fd, alive_fd, operator_fd, *pidfds]
         self._spawn("control", "tools.run.control_process", job, fds)

@@ -18,13 +18,14 @@ def code_and_machine() -> dict[str, str]:
     }
 
 
-def run_facts(level: str, seed: int, *, in_contact: bool) -> dict[str, str]:
+def run_facts(level: str, seed: int, *, in_contact: bool, faults: tuple[str, ...] = ()) -> dict[str, str]:
     """Return the facts of a run; none differs between two runs of the same code on the same machine."""
     return {
         **code_and_machine(),
         "level": level,
         "seed": str(seed),
         "in_contact": str(in_contact),
+        **({"faults_injected": "; ".join(faults)} if faults else {}),
     }
 
 

@@ -10,7 +10,7 @@ import time
 from typing import Any
 
 from robot_io.rig.config import RigConfig
-from safety.faults import FAULTS
+from tools.verdict.first_cause import fault_words, limit_and_unit, stronger_than
 
 USUAL_COLUMNS = 80
 """Width assumed if the terminal does not report it."""
@@ -29,11 +29,7 @@ class LiveLine:
 
     def show(self, status: dict[str, Any]) -> None:
         """Show one status event of control."""
-        faults = tuple(status["faults"])
-        for fault in faults:
-            if fault not in self._faults:
-                self.say(f"{fault} {FAULTS[fault].text if fault in FAULTS else ''} -> {status['mode']}")
-        self._faults = faults
+        self._tell_faults(status)
         if self._quiet:
             return
         now_s = time.monotonic()
@@ -49,6 +45,17 @@ class LiveLine:
             self._width = len(line)
         else:
             self._write(line + "\n")
+
+    def _tell_faults(self, status: dict[str, Any]) -> None:
+        """Tell each new fault; behind the first cause of a stop only what asks for more than it: the rest follows."""
+        first, found = status["first_fault"], dict(zip(status["faults"], status["fault_values"], strict=True))
+        if first:
+            found = {first: status["first_value"]} | {i: found[i] for i in stronger_than(first, list(found))}
+        for fault, value in found.items():
+            if fault not in self._faults:
+                words = fault_words(fault, value, *limit_and_unit(self._rig, fault))
+                self.say(f"{words} -> {status['mode']}")
+        self._faults = tuple(found)
 
     def say(self, text: str) -> None:
         """Print a separate line."""
