@@ -55,6 +55,7 @@ class Latch(IntEnum):
     TRAVEL = 14
     MOVING_TIME = 15
     CONTACT_SPEED = 16
+    SUSPENDED = 17
 
 
 LATCH_TEXT = {
@@ -73,6 +74,7 @@ LATCH_TEXT = {
     Latch.EOF_MOVING: "control died while the base was moving",
     Latch.PAUSED: "the gate itself was frozen for more than 100 ms",
     Latch.CONTACT_SPEED: "control sent a velocity at which the contact ball is beyond the envelope",
+    Latch.SUSPENDED: "this machine was suspended, or its clock stood still",
     Latch.TRAVEL: "the base has travelled further than this push can need",
     Latch.MOVING_TIME: "the base has moved for longer than this push can need",
 }
@@ -85,6 +87,7 @@ LATCH_FAULT = {
     Latch.LINK: "F30",
     Latch.PAUSED: "F67",
     Latch.TRAVEL: "F47",
+    Latch.SUSPENDED: "F61",
     Latch.MOVING_TIME: "F48",
 }
 """The row of the fault table for each latch; any other latch is F36, a command that was refused."""

@@ -19,7 +19,7 @@ from typing import TypeVar
 import msgspec
 from msgspec.structs import astuple, replace
 
-from robot_io.clock import NS_PER_MS, monotonic_ns
+from robot_io.clock import NS_PER_MS, asleep_ns, monotonic_ns
 from robot_io.driver import Base
 from robot_io.errors import PushError
 from robot_io.ipc.event_loop import EventLoop
@@ -143,7 +143,7 @@ class GateProcess:
 
     def _send_due(self) -> None:
         now_ns = monotonic_ns()
-        self._shell, latching = self._shell.on_leaving(now_ns)
+        self._shell, latching = self._shell.on_asleep(asleep_ns()).on_leaving(now_ns)
         if latching is not None:
             self._log.latched(now_ns, *astuple(latching))
             self._status.say("latched", latch=int(latching.latch), text=latching.text)
