@@ -21,7 +21,7 @@ from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
-from robot_io.rig.task import GoalConfig, WorkspaceConfig
+from robot_io.rig.task import WorkspaceConfig
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
 from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
@@ -213,9 +213,9 @@ class RigConfig(Table, frozen=True):
     path: PathConfig = PathConfig()
     sliders: SlidersConfig = SlidersConfig()
     control: ControlConfig = ControlConfig()
-    goal: GoalConfig = GoalConfig()
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
+    goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()
 

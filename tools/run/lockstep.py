@@ -19,7 +19,7 @@ from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
 from robot_io.messages import ArmRecord
-from robot_io.rig.config import RigConfig
+from robot_io.rig.config import RigConfig, rig_from_toml
 from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.fault_words import FaultWord
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
@@ -194,9 +194,9 @@ class Lockstep:
         )
 
 
-def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool, faults: tuple[str, ...] = ()) -> RunLog:
+def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
     """Open the log of a lockstep run; its facts hold nothing that differs from run to run."""
-    facts = run_facts("sim", seed, in_contact=in_contact, faults=faults)
+    facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact)
     return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
 
 
