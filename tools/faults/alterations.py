@@ -32,6 +32,11 @@ def host_once(ticks: int, **changes: bool | int) -> Alter:
     return lambda inp, state, n: host(**changes)(inp, state, n) if n < ticks else inp
 
 
+def silent(key: str) -> Alter:
+    """Return the alteration in which a process gives no sign of life, by the name of the fact."""
+    return lambda inp, state, n: host(**{key: n * PERIOD_NS})(inp, state, n)
+
+
 def operator_stop(after_ticks: int = 0) -> Alter:
     """Return the alteration in which the stop key is pressed once."""
     return lambda inp, _state, n: replace(inp, operator=int(Operator.STOP)) if n == after_ticks else inp

@@ -115,7 +115,10 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F60-late", "one tick skipped", alter=do.host_once(1, skipped=1)),
     Scenario("F60-slow", "30 ms", alter=do.host_once(1, skipped=3)),
     Scenario("F60-slow", "three ticks in a row", alter=do.host(skipped=1)),
+    Scenario("F61", "suspended", alter=do.host(asleep_ns=20_000_001)),
     Scenario("F63", "recorder gone", alter=do.host(recorder_alive=False)),
+    Scenario("F63", "recorder frozen", alter=do.silent("recorder_silent_ns")),
+    Scenario("F63", "records lost", alter=do.host(log_dropped=1)),
     Scenario("F64", "stop key", alter=do.operator_stop()),
     Scenario("F65", "control dead", dead=True),
     Scenario("F66", "control silent", silent=True),
@@ -124,4 +127,6 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F67-late", "gate frozen", alter=do.no_gate_record),
     Scenario("F68", "an exception", core=do.failing),
     Scenario("F69", "the arm's process gone", alter=do.host(arm_alive=False)),
+    Scenario("F73-hold", "launcher frozen", alter=do.silent("launcher_silent_ns")),
+    Scenario("F73-stop", "launcher frozen", alter=do.silent("launcher_silent_ns")),
 )
