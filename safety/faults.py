@@ -11,6 +11,7 @@ from enum import StrEnum
 import msgspec
 
 from robot_io.tick import Mode
+from safety.fault_advice import advice_of
 from safety.settings import SafetySettings
 
 
@@ -37,6 +38,10 @@ class Fault(msgspec.Struct, frozen=True):
     limit: float | str | None = None
     """Beyond it the row is found: a number in `unit`, or the field of SafetySettings that holds it."""
     unit: str = ""
+    cause: str = ""
+    """Likely causes, for people."""
+    next_step: str = ""
+    """What to do."""
 
 
 def _row(
@@ -50,7 +55,7 @@ def _row(
     limit: float | str | None = None,
     unit: str = "",
 ) -> tuple[str, Fault]:
-    return id_, Fault(id_, text, mode, clears, bound, exit_code, measured, limit, unit)
+    return id_, Fault(id_, text, mode, clears, bound, exit_code, measured, limit, unit, *advice_of(id_))
 
 
 _A, _L = Clears.AUTO, Clears.LATCHED

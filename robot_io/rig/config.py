@@ -21,7 +21,7 @@ from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
-from robot_io.rig.task import GoalConfig, WorkspaceConfig
+from robot_io.rig.task import FaultsConfig, GoalConfig, WorkspaceConfig
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
 from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
@@ -191,13 +191,6 @@ class LimitsConfig(Table, frozen=True):
     """Drift of an arm joint at which the base holds ..."""
     drift_stop_rad: Positive = 0.01
     """... and at which it stops (F20)."""
-
-
-class FaultsConfig(Table, frozen=True):
-    """Faults to inject at levels sim and emulated, for rehearsals and tests (docs/faults.md)."""
-
-    inject: tuple[str, ...] = ()
-    """Each `DEVICE.KIND[=VALUE] at T s [for T s]`, as after `push run --fault`."""
 
 
 class RigConfig(Table, frozen=True):
