@@ -15,6 +15,7 @@ import msgspec
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, Vector3, Vector6, WorldTwist
 
+Vector4 = tuple[float, float, float, float]
 _ZERO6: Vector6 = (0.0,) * 6
 U32 = Annotated[int, "uint32"]
 Counts6 = tuple[U32, U32, U32, U32, U32, U32]
@@ -250,6 +251,17 @@ class ForceState(msgspec.Struct, frozen=True, gc=False):
     """How often the force of this push was seen in each newton, from 0 on; all larger ones come last."""
 
 
+class WorkspaceState(msgspec.Struct, frozen=True, gc=False):
+    """Where the base may be when the rig gives no workspace: a box about the path, as it lies from the start."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/WorkspaceState"
+    known: bool = False
+    """Whether the run has begun to move; until then the box is not fixed."""
+    corners_x: Vector4 = (0.0, 0.0, 0.0, 0.0)
+    corners_y: Vector4 = (0.0, 0.0, 0.0, 0.0)
+    """Corners of the box in order, m, WORLD frame."""
+
+
 class SafetyState(msgspec.Struct, frozen=True, gc=False):
     """What safety remembers from tick to tick."""
 
@@ -292,6 +304,7 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     """What was measured then, in the row's unit."""
     first_fault_ns: int = 0
     force: ForceState = ForceState()
+    workspace: WorkspaceState = WorkspaceState()
 
 
 class EnvelopeState(msgspec.Struct, frozen=True, gc=False):

@@ -11,6 +11,8 @@ from robot_io.rig.config import RigConfig
 from robot_io.rig.types import Matrix3
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
+from safety.motion_bounds import total_bounds
+from safety.workspace import WorkspaceSettings
 
 SATURATED = 0.95
 """Share of the sensor's range."""
@@ -55,14 +57,18 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     least_rate: float
     """Rates of the sensor below which it is told, and at which the base is held, Hz."""
     base_from_sensor: Matrix3
-    contact_force: float
-    """The force that counts as contact at once, N."""
+    total_travel: float
+    total_moving: float
+    """What the whole run can need, m and s; the gate latches beyond it."""
+    workspace: WorkspaceSettings
 
     @classmethod
     def of(cls, rig: RigConfig) -> SafetySettings:
         """Resolve the settings of a rig."""
         limits = rig.limits
         period_ns = round(1e9 / rig.loop.rate_hz)
+        bounds = total_bounds(rig)
+        contact_x, contact_y, _ = rig.frames.contact_in_base_m
         fx, fy, fz, mx, my, mz = rig.ft.declared.range
         return cls(
             period_ns,
@@ -87,12 +93,16 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
                 limits.max_acceleration_m_per_s2,
                 limits.max_yaw_acceleration_rad_per_s2,
                 period_ns,
+                contact_x,
+                contact_y,
             ),
             math.ceil(DAMAGED_SHARE * DAMAGED_S * rig.ft.declared.rate_hz),
             LOW_RATE_SHARE * rig.ft.declared.rate_hz,
             LEAST_RATE_SHARE * rig.ft.declared.rate_hz,
             rig.frames.base_from_sensor,
-            rig.control.force_min_N,
+            bounds.distance_m,
+            bounds.moving_s,
+            WorkspaceSettings.of(rig),
         )
 
 

@@ -15,7 +15,7 @@ _CYCLE_S = 0.008
 
 
 class SimUr10(DriverBase):
-    """A UR10 held still, sampled on its own grid: `rate_hz` and `phase` (0..1 of a period) against `clock` (ns)."""
+    """A UR10 held still, sampled on a grid of its own: `rate_hz` and `phase` (0..1 of a period), `clock` in ns."""
 
     def __init__(self, source: ArmSource, clock: ClockNs, *, rate_hz: float = 124.99, phase: float = 0.21) -> None:
         self._source = source

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 PROGRAM = """
-from tools.dev.mutants.pool import run_jobs
+from tools.dev.mutants.trial.pool import run_jobs
 print(sorted(run_jobs(list(range(7)), lambda tree, job: job * job, 3)))
 """
 

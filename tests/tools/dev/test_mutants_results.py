@@ -4,8 +4,8 @@ import pytest
 
 from tools.dev.mutants import digests
 from tools.dev.mutants.find import find_mutants
-from tools.dev.mutants.judge import Verdict
 from tools.dev.mutants.results import Results
+from tools.dev.mutants.trial.judge import Verdict
 
 FILES = ["tests/test_a.py", "tests/test_b.py"]
 KILLED, SURVIVED = Verdict("killed", "tests/test_a.py::test"), Verdict("survived", "")

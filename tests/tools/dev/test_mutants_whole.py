@@ -149,7 +149,7 @@ def test_interrupted_it_goes_on_where_it_was(project):
 ENDLESS = """
 import sys, json
 from pathlib import Path
-from tools.dev.mutants.session import prepare, run_tests
+from tools.dev.mutants.trial.session import prepare, run_tests
 prepare()
 ended = run_tests(Path(sys.argv[1]), ["test_endless.py"], None, 3.0)
 print(json.dumps([ended.passed, ended.failed]))

@@ -10,16 +10,17 @@ import os
 import sys
 import time
 
-from tools.dev.mutants import choose, digests, reach
+from tools.dev.mutants import choose, digests
 from tools.dev.mutants.equivalents import BadList, read_equivalents
-from tools.dev.mutants.judge import Judge, Trial, Verdict
 from tools.dev.mutants.mutant import Mutant
-from tools.dev.mutants.pool import run_jobs
 from tools.dev.mutants.results import Results
-from tools.dev.mutants.session import run_tests
 from tools.dev.mutants.summary import NOTICED, Summary
 from tools.dev.mutants.targets import ROOT, SHELLS, WHOLE_TESTS
-from tools.dev.mutants.tree import Tree
+from tools.dev.mutants.trial import reach
+from tools.dev.mutants.trial.judge import Judge, Trial, Verdict
+from tools.dev.mutants.trial.pool import run_jobs
+from tools.dev.mutants.trial.session import run_tests
+from tools.dev.mutants.trial.tree import Tree
 
 KEPT = ROOT / ".mutants"
 """Results and measurements of earlier sessions; git ignores it, and it may be deleted at any time."""

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 from tools.dev.mutants import digests
-from tools.dev.mutants.judge import Verdict
 from tools.dev.mutants.mutant import Mutant
 from tools.dev.mutants.targets import ROOT
+from tools.dev.mutants.trial.judge import Verdict
 
 
 class Results:

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterable
 
 from tools.dev.mutants.equivalents import Equivalent
-from tools.dev.mutants.judge import Verdict
 from tools.dev.mutants.mutant import Mutant
+from tools.dev.mutants.trial.judge import Verdict
 
 NOTICED = ("killed", "timeout")
 

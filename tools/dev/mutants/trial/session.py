@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import pytest
 
-from tools.dev.mutants.plugin import ChosenTests, CoverageContexts
 from tools.dev.mutants.targets import PRODUCT, ROOT
+from tools.dev.mutants.trial.plugin import ChosenTests, CoverageContexts
 
 PRELOADED = (
     "hypothesis.strategies",

@@ -9,10 +9,10 @@ from typing import Any
 
 from tools.dev.mutants import digests
 from tools.dev.mutants.mutant import Mutant
-from tools.dev.mutants.pool import run_jobs
-from tools.dev.mutants.session import run_tests
 from tools.dev.mutants.targets import WHOLE, WHOLE_TESTS
-from tools.dev.mutants.tree import Tree
+from tools.dev.mutants.trial.pool import run_jobs
+from tools.dev.mutants.trial.session import run_tests
+from tools.dev.mutants.trial.tree import Tree
 
 PATIENCE_S = 12.0
 """Of the tests that reach a mutant, the quickest are run, up to this total time."""

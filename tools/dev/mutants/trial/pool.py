@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO, TypeVar, cast
 
-from tools.dev.mutants import session
-from tools.dev.mutants.tree import Tree
+from tools.dev.mutants.trial import session
+from tools.dev.mutants.trial.tree import Tree
 
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
@@ -74,8 +74,10 @@ def _start(
     try:
         # A worker that held another's end open would keep it from noticing that ours closed. A socket stays open as
         # long as a stream made of it does.
-        for stream in (*(stream for _, stream in others.values()), ours, *others):
+        for _, stream in others.values():
             stream.close()
+        for link in (ours, *others):
+            link.close()
         ctypes.CDLL(None).prctl(_PDEATHSIG, signal.SIGINT, 0, 0, 0)
         if os.getppid() == parent:
             _serve(theirs, Tree.copy(root), jobs, handle)

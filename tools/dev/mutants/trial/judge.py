@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tools.dev.mutants.mutant import Mutant
-from tools.dev.mutants.session import run_tests
-from tools.dev.mutants.tree import Tree
+from tools.dev.mutants.trial.session import run_tests
+from tools.dev.mutants.trial.tree import Tree
 
 FIRST_S = 0.5
 """The quickest tests, up to this total time and from few files, run first: most mutants are killed by them."""
