@@ -49,7 +49,8 @@ def check(
         runs = _axis_runs(runs, (*last, *torque), (*reading.force, *reading.torque), settings.same)
         if _spike(before, last, reading.force):
             faults.append(Finding("F08", math.dist(before, last)))
-        wrong = wrong + 1 if sought and _wrong(settings.base_from_sensor, control, inp.base.sent, reading) else 0
+        if control.phase != Phase.LOST:  # a force that turns about goes through none
+            wrong = wrong + 1 if sought and _wrong(settings.base_from_sensor, control, inp.base.sent, reading) else 0
         before, last, torque = last, reading.force, reading.torque
     frozen = max((run for run, scatters in zip(runs, settings.scatters, strict=True) if scatters), default=0)
     if frozen >= settings.frozen_readings and control.speed > 0.0:
