@@ -212,6 +212,17 @@ class RigConfig(Table, frozen=True):
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()
 
+    @property
+    def scatters(self) -> tuple[bool, bool, bool, bool, bool, bool]:
+        """Whether each axis of the sensor scatters at rest: all do, but those of a simulated one without noise.
+
+        A real sensor is never exempt, whatever noise its data sheet or this file states.
+        """
+        hardware = self.ft.level == "hardware"
+        force = hardware or self.world.sensor.noise_force_N > 0.0
+        torque = hardware or self.world.sensor.noise_torque_Nm > 0.0
+        return force, force, force, torque, torque, torque
+
 
 def shipped_rigs() -> list[str]:
     """Return the names of the rigs that come with the program."""
