@@ -171,7 +171,7 @@ class BaseReport(msgspec.Struct, frozen=True, gc=False, tag=True):
 
 
 class SliderPose(msgspec.Struct, frozen=True, gc=False, tag=True):
-    """Pose of the pushed object in the WORLD frame, from motion capture: for the log, never for control."""
+    """Pose of the pushed object in the WORLD frame, from motion capture: for log and workspace, never for control."""
 
     pose: Pose2D
     flaw: str = ""
@@ -268,6 +268,13 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     """The `Latch` that came first, 0: none."""
     published_ns: int = 0
     """When this record was written."""
+    travel_m: float = 0.0
+    """How far the base has travelled since the run's first motion: as sent or as measured, whichever is more."""
+    moving_s: float = 0.0
+    """How long it has moved since then."""
+    object_pose: Pose2D = Pose2D(_NAN, _NAN, _NAN)
+    """The newest usable pose of the pushed object, where motion capture sees it: for the workspace only."""
+    object_received_ns: int = 0
 
 
 NO_BASE = BaseRecord()

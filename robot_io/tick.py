@@ -15,6 +15,7 @@ import msgspec
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, Vector3, Vector6, WorldTwist
 
+Vector4 = tuple[float, float, float, float]
 _ZERO6: Vector6 = (0.0,) * 6
 U32 = Annotated[int, "uint32"]
 
@@ -174,6 +175,27 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     end_lateral_m: float = 0.0
     residual_N: float = float("nan")
     """Force left after the run, out of contact; NaN when it was not checked."""
+    lost_count: int = 0
+    """How often the contact was lost after it was first found."""
+    lost_m: float = 0.0
+    """Distance travelled without the contact, as odometry measured it, since it was first found."""
+    lost_ns: int = 0
+    """Time in motion without the contact since it was first found."""
+    early_contact: bool = False
+    """Whether the first contact came more than 0.3 m, and half of the way, before it was expected."""
+    force_before_contact_N: float = float("nan")
+    """Size of the mean force in the half second before the first contact, where it should be 0; NaN before it."""
+
+
+class WorkspaceState(msgspec.Struct, frozen=True, gc=False):
+    """Where the base may be when the rig gives no workspace: a box about the path, as it lies from the start."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/WorkspaceState"
+    known: bool = False
+    """Whether the run has begun to move; until then the box is not fixed."""
+    corners_x: Vector4 = (0.0, 0.0, 0.0, 0.0)
+    corners_y: Vector4 = (0.0, 0.0, 0.0, 0.0)
+    """Corners of the box in order, m, WORLD frame."""
 
 
 class SafetyState(msgspec.Struct, frozen=True, gc=False):
@@ -216,6 +238,7 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     first_value: float = float("nan")
     """What was measured then, in the row's unit."""
     first_fault_ns: int = 0
+    workspace: WorkspaceState = WorkspaceState()
 
 
 class EnvelopeState(msgspec.Struct, frozen=True, gc=False):

@@ -78,6 +78,10 @@ def _of_link(inp: TickInput) -> list[str]:
     faults: list[str] = []
     if base.latched and base.latch_cause == Latch.LINK:
         faults.append("F30")
+    elif base.latched and base.latch_cause == Latch.TRAVEL:
+        faults.append(Finding("F47", base.travel_m))
+    elif base.latched and base.latch_cause == Latch.MOVING_TIME:
+        faults.append(Finding("F48", base.moving_s))
     elif base.latched or not inp.host.gate_alive:
         faults.append("F67")
     if inp.now_ns - base.published_ns > GATE_RECORD_STOP_NS:

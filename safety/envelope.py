@@ -1,4 +1,6 @@
-"""The last pure step before the gate: speed clamp, rate limit, and the reaction of the mode.
+"""The last pure step before the gate: the reaction of the mode, speed clamps, rate limit.
+
+Base and contact ball are bounded by the same speed: the ball sits about a metre in front, so that a turn moves it.
 
 The envelope never rotates a velocity: clamps scale the complete vector, so that the push keeps its direction.
 """
@@ -28,6 +30,9 @@ class EnvelopeLimits(msgspec.Struct, frozen=True, gc=False):
     acceleration: float
     turn_acceleration: float
     period_ns: int
+    contact_x: float
+    contact_y: float
+    """Centre of the contact ball in the BODY frame, m: it may be no faster than the base."""
 
 
 def too_fast(limits: EnvelopeLimits, measured: BodyTwist) -> bool:
@@ -35,6 +40,18 @@ def too_fast(limits: EnvelopeLimits, measured: BodyTwist) -> bool:
     return not (
         math.hypot(measured.vx, measured.vy) <= OVERSPEED_FACTOR * limits.speed
         and abs(measured.omega) <= OVERSPEED_FACTOR * limits.turn_rate
+    )
+
+
+def contact_speed(limits: EnvelopeLimits, twist: BodyTwist) -> float:
+    """Return the speed of the contact ball, m/s, for a velocity of the base (BODY frame)."""
+    return math.hypot(twist.vx - twist.omega * limits.contact_y, twist.vy + twist.omega * limits.contact_x)
+
+
+def reduces(new: BodyTwist, old: BodyTwist) -> bool:
+    """Return whether every component moves towards zero or stays the same."""
+    return all(
+        abs(b) <= abs(a) and a * b >= 0.0 for a, b in ((old.vx, new.vx), (old.vy, new.vy), (old.omega, new.omega))
     )
 
 
@@ -61,12 +78,40 @@ def apply(
     if abs(omega) > limits.turn_rate:
         omega = math.copysign(limits.turn_rate, omega)
         clamped = True
-    period_s = limits.period_ns * 1e-9
-    vx, vy = _towards(state.last.vx, state.last.vy, vx, vy, limits.acceleration * period_s)
-    step = limits.turn_acceleration * period_s
-    omega = state.last.omega + min(max(omega - state.last.omega, -step), step)
-    command = BodyTwist(vx, vy, omega)
+    wish = BodyTwist(vx, vy, omega)
+    if contact_speed(limits, wish) > limits.speed:
+        wish = _slowed(limits, wish)
+        clamped = True
+    command = _stepped(limits, state.last, wish)
     return EnvelopeState(command, state.clamps + clamped, clamped), command
+
+
+def _slowed(limits: EnvelopeLimits, twist: BodyTwist) -> BodyTwist:
+    """Return the twist scaled as a whole so that the contact ball is no faster than allowed."""
+    share = limits.speed / contact_speed(limits, twist)
+    return BodyTwist(twist.vx * share, twist.vy * share, twist.omega * share)
+
+
+def _stepped(limits: EnvelopeLimits, last: BodyTwist, wish: BodyTwist) -> BodyTwist:
+    """Return the command one tick from `last` towards `wish`, both within the limits of base and contact ball."""
+    period_s = limits.period_ns * 1e-9
+    step, turn_step = limits.acceleration * period_s, limits.turn_acceleration * period_s
+    vx, vy = _towards(last.vx, last.vy, wish.vx, wish.vy, step)
+    command = BodyTwist(vx, vy, last.omega + min(max(wish.omega - last.omega, -turn_step), turn_step))
+    if contact_speed(limits, command) <= limits.speed:
+        return command
+    slowed = _slowed(limits, command)
+    if reduces(slowed, last):
+        return slowed
+    # Scaled, another component may jump. On the straight line from `last` to `wish` the ball keeps its limit anyway.
+    away, turn_away = math.hypot(wish.vx - last.vx, wish.vy - last.vy), abs(wish.omega - last.omega)
+    share = min(step / max(away, step), turn_step / max(turn_away, turn_step))
+    straight = BodyTwist(
+        last.vx + share * (wish.vx - last.vx),
+        last.vy + share * (wish.vy - last.vy),
+        last.omega + share * (wish.omega - last.omega),
+    )
+    return _slowed(limits, straight) if contact_speed(limits, straight) > limits.speed else straight
 
 
 def _towards(x: float, y: float, to_x: float, to_y: float, step: float) -> tuple[float, float]:

@@ -15,7 +15,9 @@ import msgspec
 
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
-from safety.envelope import EnvelopeLimits, too_fast
+from safety.envelope import EnvelopeLimits, contact_speed, reduces, too_fast
+from safety.motion_bounds import TravelLimits
+from safety.travel import Travel
 
 ZERO = BodyTwist()
 
@@ -27,6 +29,8 @@ STEP_MARGIN = 1.2
 """A step of the command may exceed the acceleration limit by this much (rounding, lateness)."""
 REPEAT_NS = 18_000_000
 """Unchanged or growing commands are sent every 20 ms (less the jitter of a tick); reduced and zero ones at once."""
+CONTACT_MARGIN = 1.001
+"""The contact ball may exceed the envelope by this much (rounding in the envelope's scaling)."""
 OVERSPEED_SAMPLES = 3
 
 
@@ -47,6 +51,9 @@ class Latch(IntEnum):
     LINK = 11
     EOF_MOVING = 12
     PAUSED = 13
+    TRAVEL = 14
+    MOVING_TIME = 15
+    CONTACT_SPEED = 16
 
 
 LATCH_TEXT = {
@@ -64,6 +71,9 @@ LATCH_TEXT = {
     Latch.LINK: "the base link is gone",
     Latch.EOF_MOVING: "control died while the base was moving",
     Latch.PAUSED: "the gate itself was frozen for more than 100 ms",
+    Latch.CONTACT_SPEED: "control sent a velocity at which the contact ball is beyond the envelope",
+    Latch.TRAVEL: "the base has travelled further than this push can need",
+    Latch.MOVING_TIME: "the base has moved for longer than this push can need",
 }
 
 LATCH_FAULT = {
@@ -73,6 +83,8 @@ LATCH_FAULT = {
     Latch.OVERSPEED: "F35",
     Latch.LINK: "F30",
     Latch.PAUSED: "F67",
+    Latch.TRAVEL: "F47",
+    Latch.MOVING_TIME: "F48",
 }
 """The row of the fault table for each latch; any other latch is F36, a command that was refused."""
 
@@ -131,6 +143,13 @@ def on_speed(limits: EnvelopeLimits, state: GateState, twist: BodyTwist) -> Gate
     return latched(state, Latch.OVERSPEED) if count >= OVERSPEED_SAMPLES and not state.latch else state
 
 
+def on_travel(limits: TravelLimits, state: GateState, travel: Travel) -> GateState:
+    """Latch when the base has travelled further, or moved for longer, than the whole run can need."""
+    if travel.distance_m > limits.distance_m:
+        return latched(state, Latch.TRAVEL)
+    return latched(state, Latch.MOVING_TIME) if travel.moving_ns > limits.moving_s * 1e9 else state
+
+
 def on_eof(state: GateState) -> GateState:
     """Latch because control closed its end of the socket: the normal end, or a crash in the middle of a push."""
     return latched(state, Latch.EOF if state.twist == ZERO else Latch.EOF_MOVING)
@@ -146,7 +165,7 @@ def due(state: GateState, now_ns: int) -> BodyTwist | None:
     if state.frame_ns == 0 and not state.latch:
         return None
     wanted = state.twist
-    if now_ns - state.sent_ns >= REPEAT_NS or (wanted != state.sent and _reduces(wanted, state.sent)):
+    if now_ns - state.sent_ns >= REPEAT_NS or (wanted != state.sent and reduces(wanted, state.sent)):
         return wanted
     return None
 
@@ -172,7 +191,9 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
         1.0 + 1e-9
     ):
         return Latch.ENVELOPE
-    if not _reduces(twist, state.twist):
+    if not reduces(twist, state.twist):
+        if contact_speed(limits, twist) > CONTACT_MARGIN * limits.speed:
+            return Latch.CONTACT_SPEED
         ticks = frame.tick - state.tick if state.tick >= 0 else 1
         # More ticks than fit into the longest allowed silence do not justify a larger jump.
         time_s = min(ticks * limits.period_ns, FRAME_MAX_AGE_NS + limits.period_ns) * 1e-9
@@ -184,10 +205,3 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
         ):
             return Latch.STEP
     return Latch.NONE
-
-
-def _reduces(new: BodyTwist, old: BodyTwist) -> bool:
-    """Return whether every component moves towards zero or stays the same."""
-    return all(
-        abs(b) <= abs(a) and a * b >= 0.0 for a, b in ((old.vx, new.vx), (old.vy, new.vy), (old.omega, new.omega))
-    )

@@ -31,6 +31,7 @@ from robot_io.log.gate_log import GateLog
 from robot_io.rig.config import BaseConfig, FramesConfig
 from safety.envelope import EnvelopeLimits
 from safety.gate_shell import GateShell
+from safety.motion_bounds import TravelLimits
 
 PRIORITY = 82
 CLOCK_NS = 2 * NS_PER_MS
@@ -45,6 +46,7 @@ class GateJob(msgspec.Struct, frozen=True):
     kind_folder: str
     """Further folders in which to look for the module of the base's kind."""
     limits: EnvelopeLimits
+    bounds: TravelLimits
     control_fd: int
     record_fd: int
     ring_fd: int
@@ -63,7 +65,7 @@ class GateProcess:
         self._control.setblocking(False)
         self._record_out = TypedRecord(job.record_fd, BASE_RECORD)
         self._log = GateLog(Ring(job.ring_fd).push, job.wall_offset_ns)
-        self._shell = GateShell(job.limits, monotonic_ns())
+        self._shell = GateShell(job.limits, job.bounds, monotonic_ns())
         self._loop = EventLoop()
 
     def run(self) -> None:

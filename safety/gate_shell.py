@@ -28,11 +28,14 @@ from robot_io.messages import (
     BodyTwist,
     DeviceHealth,
     LinkState,
+    SliderPose,
     Stamped,
 )
 from safety import gate
 from safety.envelope import EnvelopeLimits
 from safety.gate import GateState, Latch
+from safety.motion_bounds import TravelLimits
+from safety.travel import Travel
 
 PUBLISH_NS = 10_000_000
 """A record is published at least this often, and whenever something changes."""
@@ -58,9 +61,12 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
     """The gate's complete state. Every method returns the next shell; times are CLOCK_MONOTONIC ns."""
 
     limits: EnvelopeLimits
+    bounds: TravelLimits
+    """What the whole run can need."""
     ran_ns: int
     """When the gate could last send; used to detect a pause of the gate that is too long."""
     gate: GateState = GateState()
+    travel: Travel = Travel()
     record: BaseRecord = BaseRecord()
     """The record of base and gate that control reads."""
     told: Latch = Latch.NONE
@@ -88,7 +94,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
 
     def on_samples(self, samples: Sequence[Stamped[BaseFeed]]) -> GateShell:
         """Process samples from the base, oldest first; three consecutive measured speeds beyond the limits latch."""
-        state, changes = self.gate, dict[str, Any]()
+        state, travel, changes = self.gate, self.travel, dict[str, Any]()
         pose_seq, odometry_seq = self.record.pose_seq, self.record.odometry_seq
         for sample in samples:
             value, at_ns = sample.value, sample.received_ns
@@ -99,13 +105,16 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
                 odometry_seq += 1
                 changes.update(odometry=value.twist, odometry_received_ns=at_ns)
                 state = gate.on_speed(self.limits, state, value.twist)
+                travel = travel.on_speed(value.twist, at_ns)
             elif isinstance(value, BaseReport):
                 changes.update(status=value.status, status_received_ns=at_ns)
-            # The object's pose is only logged; the echo of our own commands is for the driver.
+            elif isinstance(value, SliderPose) and not value.flaw:
+                changes.update(object_pose=value.pose, object_received_ns=at_ns)
+            # The echo of our own commands is for the driver.
         if not changes:
             return self
         record = replace(self.record, pose_seq=pose_seq, odometry_seq=odometry_seq, **changes)
-        return replace(self, gate=state, record=record)
+        return replace(self, gate=state, travel=travel, record=record)
 
     def on_clock(self, now_ns: int, health: DeviceHealth) -> GateShell:
         """Latch when control has been silent too long or the base's link is gone."""
@@ -115,19 +124,30 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         return replace(self, gate=gate.latched(state, Latch.LINK), link_cause=health.cause)
 
     def on_leaving(self, now_ns: int) -> tuple[GateShell, Latching | None]:
-        """Judge the gate's own pause, and return the latch to be logged now, if there is a new one.
+        """Judge the gate's own pause and the way so far; return the latch to be logged now, if there is a new one.
 
         Called before anything is sent, whatever woke the gate: after a freeze, nothing leaves before this is judged.
         """
+        travel = self.travel.on_time(now_ns, self.record.sent)
         state = gate.on_own_pause(self.gate, now_ns - self.ran_ns)
+        state = gate.on_travel(self.bounds, state, travel)
         latch = state.latch
-        shell = replace(self, gate=state, ran_ns=now_ns, told=latch)
+        shell = replace(self, gate=state, travel=travel, ran_ns=now_ns, told=latch)
         if latch == self.told:
             return shell, None
-        cause = self.link_cause if latch == Latch.LINK else ""
-        text = ": ".join(filter(None, (gate.LATCH_TEXT[latch], cause)))
+        text = ": ".join(filter(None, (gate.LATCH_TEXT[latch], shell.cause())))
         fault = "" if latch == Latch.EOF else gate.LATCH_FAULT.get(latch, "F36")
         return shell, Latching(state.seq, state.tick, latch, text, fault)
+
+    def cause(self) -> str:
+        """Return what more is known of the latch, in words; "" where nothing is."""
+        if self.gate.latch == Latch.LINK:
+            return self.link_cause
+        if self.gate.latch == Latch.TRAVEL:
+            return f"{self.travel.distance_m:.2f} m, limit {self.bounds.distance_m:.2f} m"
+        if self.gate.latch == Latch.MOVING_TIME:
+            return f"{self.travel.moving_ns * 1e-9:.0f} s, limit {self.bounds.moving_s:.0f} s"
+        return ""
 
     def due(self, now_ns: int) -> BodyTwist | None:
         """Return the command to send now, or None when nothing is due yet."""
@@ -152,6 +172,8 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
             latched=latch != Latch.NONE,
             latch_cause=int(latch),
             published_ns=now_ns,
+            travel_m=self.travel.distance_m,
+            moving_s=self.travel.moving_ns * 1e-9,
         )
         return replace(self, record=record)
 

@@ -10,6 +10,8 @@ from robot_io.messages import Joints, Vector6
 from robot_io.rig.config import FtConfig, RigConfig
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
+from safety.motion_bounds import total_bounds
+from safety.workspace import WorkspaceSettings
 
 SATURATED = 0.95
 """Share of the sensor's range."""
@@ -40,12 +42,18 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     pose_period_ns: int
     push_speed: float
     envelope: EnvelopeLimits
+    total_travel: float
+    total_moving: float
+    """What the whole run can need, m and s; the gate latches beyond it."""
+    workspace: WorkspaceSettings
 
     @classmethod
     def of(cls, rig: RigConfig) -> SafetySettings:
         """Resolve the settings of a rig."""
         limits = rig.limits
         period_ns = round(1e9 / rig.loop.rate_hz)
+        bounds = total_bounds(rig)
+        contact_x, contact_y, _ = rig.frames.contact_in_base_m
         fx, fy, fz, mx, my, mz = rig.ft.declared.range
         return cls(
             period_ns,
@@ -69,7 +77,12 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
                 limits.max_acceleration_m_per_s2,
                 limits.max_yaw_acceleration_rad_per_s2,
                 period_ns,
+                contact_x,
+                contact_y,
             ),
+            bounds.distance_m,
+            bounds.moving_s,
+            WorkspaceSettings.of(rig),
         )
 
 

@@ -1,4 +1,4 @@
-"""Whether the host kept every processor running: one small process on each, at the highest priority it may have.
+"""Whether the host kept every processor running: small processes on each, at the highest priority and at a normal one.
 
 A test on the wall clock that failed while a processor stood still for long says nothing of the program: it is
 repeated, at most three times, and says so. Nothing else is ever repeated, and no bound is widened. What no attempt
@@ -25,10 +25,11 @@ WATCHER = """
 import ctypes, os, signal, sys, time
 ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)
 os.sched_setaffinity(0, {int(sys.argv[1])})
-try:
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))
-except OSError:
-    pass
+if sys.argv[2] == "realtime":
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))
+    except OSError:
+        pass
 last = time.monotonic_ns()
 while True:
     time.sleep(0.002)
@@ -69,24 +70,39 @@ class HostWatch:
     """Watches until `close`."""
 
     def __init__(self) -> None:
-        self._file = tempfile.NamedTemporaryFile("r")  # noqa: SIM115 - closed in close()
-        with open(self._file.name, "ab") as out:  # noqa: PTH123 - appending, as every watcher does
-            self._watchers = [
-                subprocess.Popen([sys.executable, "-c", WATCHER, str(cpu)], stdin=subprocess.DEVNULL, stdout=out)
-                for cpu in sorted(os.sched_getaffinity(0))
-            ]
+        self._files = {kind: tempfile.NamedTemporaryFile("r") for kind in ("realtime", "normal")}  # noqa: SIM115 - closed in close()
+        self._watchers = []
+        for kind, file in self._files.items():
+            with open(file.name, "ab") as out:  # noqa: PTH123 - appending, as every watcher does
+                self._watchers += [
+                    subprocess.Popen(
+                        [sys.executable, "-c", WATCHER, str(cpu), kind], stdin=subprocess.DEVNULL, stdout=out
+                    )
+                    for cpu in sorted(os.sched_getaffinity(0))
+                ]
 
     def worst_ms(self, since_ns: int, until_ns: int) -> float:
         """Return the longest time that a processor stood still, of the pauses that touch this span; 0 for none."""
-        self._file.seek(0)
-        pauses = [tuple(map(int, line.split())) for line in self._file.read().splitlines()]
+        return self._worst_ms("realtime", since_ns, until_ns)
+
+    def worst_wait_ms(self, since_ns: int, until_ns: int) -> float:
+        """Return the longest time that a process of normal priority waited for its processor.
+
+        The kernel moves the bytes of a pty in such a process, and the arm's client library has such threads.
+        """
+        return self._worst_ms("normal", since_ns, until_ns)
+
+    def _worst_ms(self, kind: str, since_ns: int, until_ns: int) -> float:
+        self._files[kind].seek(0)
+        pauses = [tuple(map(int, line.split())) for line in self._files[kind].read().splitlines()]
         return max((b - a for a, b in pauses if b >= since_ns and a <= until_ns), default=0) / 1e6
 
     def close(self) -> None:
         for watcher in self._watchers:
             watcher.kill()
             watcher.wait()
-        self._file.close()
+        for file in self._files.values():
+            file.close()
 
 
 def repeated_when_the_host_stalls(test: Callable[..., None]) -> Callable[..., None]:

@@ -12,9 +12,11 @@ import contextlib
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import uuid
 from collections.abc import Iterator
@@ -24,7 +26,7 @@ from typing import Any, NamedTuple
 from robot_io.log.world_messages import COMMAND_CDR, STATE_CDR
 from robot_io.mcap.read import LogMessage, read_log
 from robot_io.messages import BodyTwist
-from tests.host_watch import HostStalled, HostWatch
+from tests.host_watch import HostStalled, HostWatch, repeated_when_the_host_stalls
 
 ROOT = Path(__file__).resolve().parents[1]
 PUSH = [sys.executable, "-c", "from robot_io._entry import main; raise SystemExit(main())"]
@@ -142,10 +144,13 @@ class Run:
 
 
 def blame_the_host(host: HostWatch, began_ns: int, code: int, err: str) -> None:
-    """Raise HostStalled when a program ended in a safety stop and a processor has stood still meanwhile."""
-    stall_ms = host.worst_ms(began_ns, time.monotonic_ns()) if code == SAFETY_STOP else 0.0
+    """Raise HostStalled when a program ended in a safety stop while a processor stood still or was overloaded."""
+    if code != SAFETY_STOP:
+        return
+    now_ns = time.monotonic_ns()
+    stall_ms = max(host.worst_ms(began_ns, now_ns), host.worst_wait_ms(began_ns, now_ns))
     if stall_ms > SPOILING_MS:
-        raise HostStalled(f"a processor stood still for {stall_ms:.0f} ms: {err[-300:]}")
+        raise HostStalled(f"the host kept a process waiting for {stall_ms:.0f} ms: {err[-300:]}")
 
 
 @contextlib.contextmanager
@@ -156,6 +161,30 @@ def started(state: Path, *argv: str, **popen: Any) -> Iterator[Run]:
         yield run
     finally:
         run.end()
+
+
+def pushed(folder: Path, *argv: str, host: HostWatch, stopped_by: str = "") -> Ended:
+    """Run `push` with `argv` in `folder`, where `out` is its run folder; again when the host spoilt it.
+
+    stopped_by: the fault that is to stop it, which is never the host's.
+    """
+    found: list[Ended] = []
+    earlier: list[Path] = []
+
+    @repeated_when_the_host_stalls
+    def attempt(tmp_path: Path) -> None:
+        if earlier:
+            shutil.rmtree(folder / "out", ignore_errors=True)
+        earlier.append(tmp_path)
+        began_ns = time.monotonic_ns()
+        with started(tmp_path / "state", *argv, cwd=folder) as run:
+            found.append(run.wait())
+            assert run.alive() == {}
+        if not (stopped_by and stopped_by in found[-1].err):
+            blame_the_host(host, began_ns, found[-1].code, found[-1].err)
+
+    attempt(tmp_path=Path(tempfile.mkdtemp(dir=folder.parent)))
+    return found[-1]
 
 
 def finished(state: Path, *argv: str, within_s: float = 90.0, **popen: Any) -> Ended:

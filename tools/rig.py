@@ -24,7 +24,7 @@ def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigC
     from safety import limits
 
     rig, problems = _with_kinds(load_rig(name_or_path, overrides), folder_of(name_or_path))
-    problems += _level_problems(rig) + _address_problems(rig)
+    problems += _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
     if not is_rotation(rig.frames.base_from_sensor):
         problems.append("`frames.base_from_sensor` is not a rotation (orthonormal rows, determinant +1)")
     if problems:

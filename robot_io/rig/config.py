@@ -21,6 +21,7 @@ from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.task import GoalConfig, WorkspaceConfig
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
 from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
@@ -94,6 +95,8 @@ class BaseConfig(Table, frozen=True):
     """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
     """How often poses come: late after 3 periods, at least 50 ms, and lost after 6, at least 120 ms (F40)."""
+    outline_m: tuple[Positive, Positive] = (0.960, 0.793)
+    """Length and width about its centre, for the workspace; by default a Ridgeback's (data sheet of May 2025)."""
     options: Options = msgspec.field(default_factory=dict)
     """What the kind itself understands."""
     topics: TopicsConfig = TopicsConfig()
@@ -202,6 +205,8 @@ class RigConfig(Table, frozen=True):
     sliders: SlidersConfig = SlidersConfig()
     control: ControlConfig = ControlConfig()
     limits: LimitsConfig = LimitsConfig()
+    workspace: WorkspaceConfig = WorkspaceConfig()
+    goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
 
 

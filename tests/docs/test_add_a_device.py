@@ -6,11 +6,12 @@ import os
 import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from tests.push_runs import QUICK, started
+from tests.push_runs import QUICK, pushed
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/add-a-device.md").read_text(encoding="utf-8")
@@ -27,9 +28,9 @@ def folder(tmp_path_factory):
     return path
 
 
-def push(state, folder, *argv):
-    with started(state, *argv, cwd=folder) as run:
-        return run.wait()
+@pytest.fixture
+def push(host):
+    return partial(pushed, host=host)
 
 
 def test_the_driver_is_under_eighty_lines(folder):
@@ -37,9 +38,9 @@ def test_the_driver_is_under_eighty_lines(folder):
     assert len([line for line in lines if line.strip()]) < 80
 
 
-def test_a_push_with_the_pages_sensor_replays_exactly(folder, tmp_path):
+def test_a_push_with_the_pages_sensor_replays_exactly(push, folder, tmp_path):
     done = push(
-        tmp_path, folder, "run", "emulated", "--set", f"ft.kind={KIND}", "--distance-m", "0.3", "--out", "out",
+        folder, "run", "emulated", "--set", f"ft.kind={KIND}", "--distance-m", "0.3", "--out", "out",
         "--json", *QUICK,
     )  # fmt: skip
     assert done.code == 0, done.err
@@ -50,29 +51,29 @@ def test_a_push_with_the_pages_sensor_replays_exactly(folder, tmp_path):
     assert summary["devices"][KIND]["packets_ok"] > 900 * seconds, "a thousand readings a second"
     elsewhere = tmp_path / "elsewhere"  # where its module cannot be found
     elsewhere.mkdir()
-    replay = push(tmp_path, elsewhere, "replay", str(folder / "out"), "--json")
+    replay = push(elsewhere, "replay", str(folder / "out"), "--json")
     assert replay.code == 0, replay.err
     assert replay.last_object["ticks"] == replay.last_object["identical"] == summary["loop"]["ticks"]
 
 
-def test_the_same_sensor_at_level_sim(folder, tmp_path):
+def test_the_same_sensor_at_level_sim(push, folder, tmp_path):
     done = push(
-        tmp_path, folder, "run", "sim", "--fast", "--set", f"ft.kind={KIND}", "--distance-m", "0.3",
+        folder, "run", "sim", "--fast", "--set", f"ft.kind={KIND}", "--distance-m", "0.3",
         "--out", str(tmp_path / "out"), "--json", "--no-report",
     )  # fmt: skip
     assert done.code == 0, done.err
     assert done.last_object["devices"][KIND]["packets_ok"] > 9.0 * done.last_object["loop"]["ticks"]
-    assert push(tmp_path, tmp_path, "replay", "out").code == 0
+    assert push(tmp_path, "replay", "out").code == 0
 
 
-def test_its_options_and_limits_are_checked_before_anything_moves(folder, tmp_path):
+def test_its_options_and_limits_are_checked_before_anything_moves(push, folder, tmp_path):
     kind = ("--set", f"ft.kind={KIND}")
-    option = push(tmp_path, folder, "run", "emulated", *kind, "--set", "ft.options.gain=2", "--no-report")
+    option = push(folder, "run", "emulated", *kind, "--set", "ft.options.gain=2", "--no-report")
     assert (option.code, option.err.count("Traceback")) == (2, 0)
     assert "no option `gain`" in option.err
-    torque = push(tmp_path, folder, "config", "check", "emulated", *kind, "--set", "limits.max_torque_Nm=19.9")
+    torque = push(folder, "config", "check", "emulated", *kind, "--set", "limits.max_torque_Nm=19.9")
     assert torque.code == 0
-    too_high = push(tmp_path, folder, "config", "check", "emulated", *kind, "--set", "limits.max_force_N=181")
+    too_high = push(folder, "config", "check", "emulated", *kind, "--set", "limits.max_force_N=181")
     assert too_high.code == 2
 
 

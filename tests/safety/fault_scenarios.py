@@ -107,6 +107,41 @@ def operator(what: Operator) -> Alter:
     return lambda inp, _: replace(inp, operator=int(what))
 
 
+WIDE = ("workspace.x_m=[-1.49, 3.0]", "workspace.y_m=[-2.0, 2.0]")
+BESIDE = ("workspace.x_m=[-1.49, 3.0]", "workspace.y_m=[-2.0, 0.4065]")
+"""The outline's left side is 0.3965 m from the middle: 10 mm of room."""
+
+
+def beside_the_edge() -> FoldBench:
+    """Return a bench that pushes along the left edge of its workspace, 10 mm beside it."""
+    return pushing(BESIDE)
+
+
+def beside_the_start_box() -> FoldBench:
+    """Return the same with a rig that gives no workspace: the base has drifted to the edge of its box."""
+    bench = pushing()
+    left = bench.pose.y + 0.4065
+    box = replace(bench.state.safety.workspace, corners_y=(-2.0, -2.0, left, left))
+    bench.state = replace(bench.state, safety=replace(bench.state.safety, workspace=box))
+    return bench
+
+
+def starting_too_far_on() -> FoldBench:
+    """Return a bench that is about to leave the tare, 0.9 m too far on for its 2 m push."""
+    bench = FoldBench(("workspace.x_m=[-1.0, 2.0]", "workspace.y_m=[-2.0, 2.0]"))
+    bench.pose = Pose2D(0.4, 0.0, 0.0)
+    while bench.state.control.tare.count < bench.core.control.tare_readings:
+        bench.fold()
+    return bench
+
+
+def object_at(x: float) -> Alter:
+    """Let motion capture see the object, 0.354 m about its middle, there."""
+    return lambda inp, _: replace(
+        inp, base=replace(inp.base, object_pose=Pose2D(x, 0.0, 0.0), object_received_ns=inp.now_ns)
+    )
+
+
 def taring() -> FoldBench:
     bench = FoldBench().run_to(Phase.TARE)
     for _ in range(5):
@@ -275,6 +310,8 @@ SCENARIOS = [
     Scenario("F67", "latched", base(latched=True, latch_cause=1)),
     Scenario("F67", "gone", host(gate_alive=False)),
     Scenario("F67-late", "frozen", old("base", "published_ns")),
+    Scenario("F47", "further than it can need", base(latched=True, latch_cause=14, travel_m=9.0)),
+    Scenario("F48", "longer than it can need", base(latched=True, latch_cause=15, moving_s=900.0)),
     # --- force and task
     Scenario("F50-slow", "pressed", pressed(101.0)),
     Scenario("F50-stop", "pressed", pressed(151.0)),
@@ -285,6 +322,14 @@ SCENARIOS = [
     Scenario("F52-hold", "no force", without_contact, lambda: pushing(UNFILTERED), warm=300,
              also=frozenset({"F52"})),
     Scenario("F53", "nothing there", without_contact, approaching_in_vain),
+    Scenario("R06", "starts too far on", lambda inp, _: inp, starting_too_far_on, also=frozenset({"F55-slow"})),
+    Scenario("F55-slow", "drifts", base(odometry=BodyTwist(0.1, 0.02, 0.0)), beside_the_edge),
+    Scenario("F55-slow", "drifts beside the box from the start", base(odometry=BodyTwist(0.1, 0.02, 0.0)),
+             beside_the_start_box),
+    Scenario("F55-stop", "drifts", base(odometry=BodyTwist(0.1, 0.05, 0.0)), beside_the_edge),
+    Scenario("F55-stop", "drifts beside the box from the start", base(odometry=BodyTwist(0.1, 0.05, 0.0)),
+             beside_the_start_box),
+    Scenario("F55-stop", "object", object_at(2.64), lambda: pushing(WIDE)),
     Scenario("F56", "backward", lambda inp, _: inp, pushing_sideways),
     Scenario("F58", "no number", lambda inp, _: inp, pushing_by_no_law),
     # --- host

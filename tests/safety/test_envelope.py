@@ -10,7 +10,7 @@ from robot_io.messages import BodyTwist
 from robot_io.tick import EnvelopeState, Mode
 from safety.envelope import EnvelopeLimits, apply
 
-LIMITS = EnvelopeLimits(0.15, 0.25, 1.0, 0.5, 10_000_000)
+LIMITS = EnvelopeLimits(0.15, 0.25, 1.0, 0.5, 10_000_000, 0.0, 0.0)
 ZERO = BodyTwist()
 STILL = (Mode.SILENT, Mode.READY, Mode.STOP, Mode.DEAD)
 MOVING = (Mode.PUSHING, Mode.SLOW, Mode.HOLD)

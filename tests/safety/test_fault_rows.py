@@ -9,7 +9,7 @@ from msgspec.structs import replace
 import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
-from safety import arm_checks, base_checks, host_checks, sensor_checks, supervisor, task_checks
+from safety import arm_checks, base_checks, host_checks, sensor_checks, supervisor, task_checks, workspace_checks
 from safety.faults import FAULTS, Clears, strongest
 from tests.mutants import load, tree_of
 from tests.safety.fault_scenarios import BY_THE_GATE, SCENARIOS, Scenario
@@ -130,7 +130,7 @@ def test_the_table_says_what_it_means():
     for key, row in FAULTS.items():
         assert key == row.id
         assert (row.mode == Mode.SILENT) == (row.bound_ticks == 0 and key != "F68")
-        assert row.exit_code in (1, 4, 5, 6, 130)
+        assert row.exit_code in (1, 2, 4, 5, 6, 130)
         if row.mode >= Mode.STOP:
             assert row.clears == Clears.LATCHED
     assert strongest(()) == Mode.SILENT
@@ -146,6 +146,7 @@ CHECKS = {
     "safety.host_checks": host_checks,
     "safety.task_checks": task_checks,
     "safety.supervisor": supervisor,
+    "safety.workspace_checks": workspace_checks,
 }
 
 

@@ -30,7 +30,10 @@ from tests.wire.bridge_process import Bridge, running_bridge, until
 
 MS = 1_000_000
 ZERO, SLOW, TOO_FAST = BodyTwist(), BodyTwist(0.004, 0.0, 0.0), BodyTwist(0.2, 0.0, 0.0)
-LIMITS = {"speed": 0.15, "turn_rate": 0.25, "acceleration": 0.5, "turn_acceleration": 1.0, "period_ns": 10 * MS}
+LIMITS = {
+    "speed": 0.15, "turn_rate": 0.25, "acceleration": 0.5, "turn_acceleration": 1.0, "period_ns": 10 * MS,
+    "contact_x": 0.0, "contact_y": 0.0,
+}  # fmt: skip
 UNTURNED = {"base_from_sensor": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "contact_in_base_m": (0, 0, 0)}
 OFTEN_MS = 40.0
 """The base stops by itself 250 ms after a command; it takes one at each of its ticks."""
@@ -52,6 +55,7 @@ class Gate:
             "frames": {**UNTURNED, "sensor_in_base_m": (0, 0, 0)},
             "kind_folder": "",
             "limits": LIMITS,
+            "bounds": {"distance_m": 2.0, "moving_s": 30.0},
             **dict(zip(("control_fd", "record_fd", "ring_fd"), fds, strict=True)),
             "status_fd": -1,
             "wall_offset_ns": 0,

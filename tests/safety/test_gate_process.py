@@ -18,8 +18,9 @@ from safety import gate_process
 from safety.envelope import EnvelopeLimits
 from safety.gate import Latch
 from safety.gate_process import GateJob, GateProcess
+from safety.motion_bounds import TravelLimits
 
-LIMITS = EnvelopeLimits(0.15, 0.25, 0.5, 1.0, 10_000_000)
+LIMITS = EnvelopeLimits(0.15, 0.25, 0.5, 1.0, 10_000_000, 0.0, 0.0)
 FRAMES = FramesConfig(((1, 0, 0), (0, 1, 0), (0, 0, 1)), (0, 0, 0), (0, 0, 0))
 SLOW, ZERO = BodyTwist(0.005, 0.0, 0.0), BodyTwist()
 MS = 1_000_000
@@ -65,6 +66,7 @@ class Rig:
             FRAMES,
             "",
             LIMITS,
+            TravelLimits(2.0, 30.0),
             gate_end.detach(),
             self.record_out.fd,
             self.ring.fd,

@@ -25,10 +25,11 @@ from robot_io.messages import (
 from safety.envelope import EnvelopeLimits
 from safety.gate import Latch
 from safety.gate_shell import GateShell, Latching
+from safety.motion_bounds import TravelLimits
 
 MS = 1_000_000
 T0 = 5_000 * MS
-NEW = GateShell(EnvelopeLimits(0.15, 0.25, 0.5, 1.0, 10 * MS), T0)
+NEW = GateShell(EnvelopeLimits(0.15, 0.25, 0.5, 1.0, 10 * MS, 0.0, 0.0), TravelLimits(2.0, 30.0), T0)
 SLOW, ZERO, FAST = BodyTwist(0.005, 0.0, 0.0), BodyTwist(), BodyTwist(0.3, 0.0, 0.0)
 UP = DeviceHealth(LinkState.UP, "", {}, 100.0)
 GONE = DeviceHealth(LinkState.LOST, "the bridge closed the connection", {}, 0.0)

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import msgspec
 from msgspec import Meta
 
-from robot_io.rig import config, topics, world
+from robot_io.rig import config, task, topics, world
 from robot_io.rig.config import RigConfig
 from robot_io.rig.renames import RENAMED, RETIRED, advice
 from tools.dev.notes import notes_of
@@ -49,7 +49,7 @@ format.
 def reference() -> str:
     """Return the page."""
     parts = [INTRO]
-    notes = notes_of(config, topics, world)
+    notes = notes_of(config, task, topics, world)
     for title, table in _tables(RigConfig, ""):
         parts.append(f"\n## {f'[{title}]' if title else 'Top level'}\n")
         doc = inspect.cleandoc(table.__doc__ or "")
@@ -88,6 +88,8 @@ def _type_text(hint: Any) -> str:
         return " \\| ".join(f"`{value}`" for value in get_args(hint))
     if get_origin(hint) is tuple:
         parts = get_args(hint)
+        if parts[-1] is Ellipsis:
+            return f"list of {_type_text(parts[0])}"
         return f"{len(parts)} x {_type_text(parts[0])}"
     if isinstance(hint, UnionType) or get_origin(hint) is Union:
         return " or ".join(_type_text(part) for part in get_args(hint) if part is not NoneType)

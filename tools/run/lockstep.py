@@ -23,6 +23,7 @@ from robot_io.rig.config import RigConfig
 from robot_io.rig.declared import FT300_FACTS
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety.gate_shell import GateShell
+from safety.motion_bounds import total_bounds
 from sim_backend.ridgeback.settings import ridgeback_settings
 from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
@@ -78,7 +79,7 @@ class Lockstep:
         )
         self._core = TickCore.of(rig, in_contact=saved is not None)
         self._state = initial_state(saved)
-        self._gate = GateShell(self._core.safety.envelope, START_NS)
+        self._gate = GateShell(self._core.safety.envelope, total_bounds(rig), START_NS)
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
         self.notes = RunNotes()
         self.operator = Operator.NONE

@@ -33,6 +33,7 @@ from robot_io.rig.config import RigConfig, rig_to_toml
 from robot_io.ur10.driver import spawn_arm
 from robot_io.ur10.job import ArmJob
 from safety.gate_process import GateJob
+from safety.motion_bounds import total_bounds
 from safety.settings import SafetySettings
 from tools.kinds import is_shipped
 from tools.places.saved_tare import SavedTare
@@ -161,9 +162,10 @@ class Processes:
 
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
         limits = SafetySettings.of(rig).envelope
+        bounds = total_bounds(rig)
         ring_fd = self._rings["gate"].fd
         job = GateJob(
-            rig.base, rig.frames, self._kind_folder, limits, control_fd, record_fd, ring_fd, -1, self._offset_ns
+            rig.base, rig.frames, self._kind_folder, limits, bounds, control_fd, record_fd, ring_fd, -1, self._offset_ns
         )
         self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 

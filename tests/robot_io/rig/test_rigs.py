@@ -83,7 +83,7 @@ def test_paper_gains():
     ("rig", "overrides", "words"),
     [
         ("sim", ["base.level=emulated"], "all three devices or none"),
-        ("emulated", ["ft.level=sim"], "ft would be sim beside arm and base"),
+        ("emulated", ["ft.level=sim"], "ft would be sim and arm and base not"),
         ("emulated", ["ft.level=hardware"], "`ft.port` is missing"),
         ("thing", ['arm.host=""', 'base.url=""'], "`arm.host` is missing, and arm is at level hardware; `base.url`"),
         ("thing", ["base.url=http://127.0.0.1:9090"], "does not start with ws://"),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from robot_io.mcap.read import read_log
 from robot_io.tick import TICK_CDR
-from tests.push_runs import QUICK, started
+from tests.push_runs import QUICK, pushed
 
 OWN = Path(__file__).with_name("own_devices.py")
 
@@ -23,15 +24,13 @@ def folder(tmp_path):
     return path
 
 
-def push(folder, *argv):
-    with started(folder.parent / "state", *argv, cwd=folder) as run:
-        ended = run.wait()
-        assert run.alive() == {}
-        return ended
+@pytest.fixture
+def push(host):
+    return partial(pushed, host=host)
 
 
 @pytest.mark.parametrize("device", ["arm=own_devices:Arm", "base=own_devices:Base"])
-def test_a_push_with_an_arm_or_base_of_ones_own_replays(folder, device):
+def test_a_push_with_an_arm_or_base_of_ones_own_replays(push, folder, device):
     name, _, kind = device.partition("=")
     done = push(
         folder,
@@ -51,16 +50,16 @@ def test_a_push_with_an_arm_or_base_of_ones_own_replays(folder, device):
     assert push(folder, "replay", "out").code == 0
 
 
-def test_an_arm_that_says_it_may_be_moved_stops_the_push(folder):
+def test_an_arm_that_says_it_may_be_moved_stops_the_push(push, folder):
     done = push(
         folder, "run", "emulated", "--set", "arm.kind=own_devices:Arm", "--set", "arm.options.free_after=300",
-        "--distance-m", "1", "--out", "out", "--json", *QUICK,
+        "--distance-m", "1", "--out", "out", "--json", *QUICK, stopped_by="F27",
     )  # fmt: skip
     assert done.code == 5, done.err
     assert done.last_object["faults"] == ["F27"]
 
 
-def test_beside_the_rig_file_it_is_found_from_anywhere(folder, tmp_path):
+def test_beside_the_rig_file_it_is_found_from_anywhere(push, folder, tmp_path):
     (folder / "mine.toml").write_text(
         'extends = "emulated"\nname = "mine"\n[arm]\nkind = "own_devices:Arm"\n', encoding="utf-8"
     )
@@ -115,7 +114,7 @@ class Weak(Whole):
         ("os:path", "is not a class"),
     ],
 )
-def test_a_kind_that_cannot_be_used_is_one_sentence_and_opens_nothing(folder, kind, says):
+def test_a_kind_that_cannot_be_used_is_one_sentence_and_opens_nothing(push, folder, kind, says):
     (folder / "kinds.py").write_text(MODULE, encoding="utf-8")
     (folder / "broken.py").write_text("class Sensor(:\n", encoding="utf-8")
     (folder / "raising.py").write_text("1 / 0\n", encoding="utf-8")
@@ -176,7 +175,7 @@ def sensors(folder):
         ("Opening", 4, "its driver failed: OSError: planted"),
     ],
 )
-def test_what_a_driver_should_not_raise_names_the_driver(sensors, kind, code, says):
+def test_what_a_driver_should_not_raise_names_the_driver(push, sensors, kind, code, says):
     done = push(sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--out", "out", "--json")
     assert done.code == code, done.err
     assert says in done.last_object["error"]["what"]
@@ -184,10 +183,10 @@ def test_what_a_driver_should_not_raise_names_the_driver(sensors, kind, code, sa
     assert "defect of the program" not in done.err
 
 
-def test_a_driver_that_raises_in_mid_push_stops_it_and_the_log_says_so(sensors):
+def test_a_driver_that_raises_in_mid_push_stops_it_and_the_log_says_so(push, sensors):
     done = push(
         sensors, "run", "emulated", "--set", "ft.kind=sensors:Draining", "--distance-m", "2", "--out", "out", "--json",
-        *QUICK,
+        *QUICK, stopped_by="F68",
     )  # fmt: skip
     assert done.code != 0
     assert "F68" in done.last_object["faults"]
@@ -196,7 +195,7 @@ def test_a_driver_that_raises_in_mid_push_stops_it_and_the_log_says_so(sensors):
 
 
 @pytest.mark.parametrize("kind", ["Uncounted", "WallClock"])
-def test_a_driver_that_counts_nothing_or_stamps_by_the_wall_clock_still_pushes(sensors, kind):
+def test_a_driver_that_counts_nothing_or_stamps_by_the_wall_clock_still_pushes(push, sensors, kind):
     done = push(
         sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--distance-m", "0.1", "--out", "out", "--json",
         *QUICK,
@@ -205,11 +204,11 @@ def test_a_driver_that_counts_nothing_or_stamps_by_the_wall_clock_still_pushes(s
     assert push(sensors, "replay", "out").code == 0
 
 
-def test_stamps_from_the_future_do_not_hide_a_silent_sensor(sensors):
+def test_stamps_from_the_future_do_not_hide_a_silent_sensor(push, sensors):
     """Silent after two and a half seconds, while it pushes: within 160 ms the run stops, not three seconds later."""
     done = push(
         sensors, "run", "emulated", "--set", "ft.kind=sensors:Ahead", "--distance-m", "2", "--out", "out", "--json",
-        *QUICK,
+        *QUICK, stopped_by="F01-stop",
     )  # fmt: skip
     assert done.code == 5, done.err
     assert "F01-stop" in done.last_object["fault_counts"]
@@ -220,7 +219,7 @@ def test_stamps_from_the_future_do_not_hide_a_silent_sensor(sensors):
     assert 0 < stopped_ns - newest_ns < 200_000_000
 
 
-def test_a_base_without_its_attributes_is_refused(folder):
+def test_a_base_without_its_attributes_is_refused(push, folder):
     (folder / "bare.py").write_text(
         "from own_devices import Base\nclass Bare(Base):\n    def __init__(self, address):\n"
         "        super().__init__(address)\n        del self.sent_ns\n",
@@ -232,14 +231,14 @@ def test_a_base_without_its_attributes_is_refused(folder):
 
 
 @pytest.mark.parametrize("device", ["arm=own_devices:Arm", "base=own_devices:Base"])
-def test_level_sim_has_no_arm_or_base_of_ones_own(folder, device):
+def test_level_sim_has_no_arm_or_base_of_ones_own(push, folder, device):
     name, _, kind = device.partition("=")
     done = push(folder, "run", "sim", "--set", f"{name}.kind={kind}", "--fast")
     assert done.code == 2
     assert "cannot be simulated at level sim" in done.err
 
 
-def test_opening_a_log_imports_nothing_that_it_names(folder):
+def test_opening_a_log_imports_nothing_that_it_names(push, folder):
     (folder / "telltale.py").write_text(
         'import pathlib\npathlib.Path("imported").touch()\nfrom own_devices import Arm\n', encoding="utf-8"
     )

@@ -1,0 +1,59 @@
+"""Where a push may go and what counts as reached: `[workspace]` and `[goal]` of a rig file."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from robot_io.polygon import Polygon, flaw
+from robot_io.rig.types import InRoom, Positive, Table
+
+
+class WorkspaceConfig(Table, frozen=True):
+    """Where base and object may be, in the WORLD frame: `x_m` with `y_m`, or `polygon_m`.
+
+    The base slows down and stops (F55) before its outline leaves it; so it does for the object where its pose is known.
+    Without one, the base may be up to 1 m beside its path and beyond the end of it, as it lies from the start.
+    """
+
+    x_m: InRoom | None = None
+    """From and to."""
+    y_m: InRoom | None = None
+    """From and to."""
+    polygon_m: Annotated[tuple[InRoom, ...], Meta(max_length=100)] | None = None
+    """Corners x, y in order; the edges must not cross."""
+
+    @property
+    def corners(self) -> Polygon:
+        """Return its corners (m, WORLD frame), none where no workspace is given."""
+        if self.x_m is not None and self.y_m is not None:
+            (left, right), (low, high) = self.x_m, self.y_m
+            return ((left, low), (right, low), (right, high), (left, high))
+        return self.polygon_m or ()
+
+    def problems(self) -> list[str]:
+        """Return what is wrong with it, in words."""
+        ranges = {"x_m": self.x_m, "y_m": self.y_m}
+        given = [key for key, value in ranges.items() if value is not None]
+        if self.polygon_m is not None:
+            if given:
+                return ["`workspace` has `polygon_m` and `x_m` or `y_m`: give one of the two forms"]
+            why = flaw(self.polygon_m)
+            return [f"`workspace.polygon_m` is no floor: {why}"] if why else []
+        if len(given) == 1:
+            return [f"`workspace.{given[0]}` needs `{'y_m' if given == ['x_m'] else 'x_m'}` beside it"]
+        return [
+            f"`workspace.{key}` = [{value[0]:g}, {value[1]:g}] does not go from the smaller to the larger"
+            for key, value in ranges.items()
+            if value is not None and value[0] >= value[1]
+        ]
+
+
+class GoalConfig(Table, frozen=True):
+    """How well the line must be kept for `done`; nothing here stops the base."""
+
+    corridor_m: Positive = 0.5
+    """How far beside the path the contact ball may be during the push (the paper's corridor)."""
+    end_tolerance_m: Positive = 0.3
+    """How far beside the path it may be at the end, or the start's own offset where that is larger."""
