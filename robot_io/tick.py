@@ -242,6 +242,12 @@ class MotionState(msgspec.Struct, frozen=True, gc=False):
     way_yaw: float = 0.0
     sent_x: float = 0.0
     sent_y: float = 0.0
+    still_x: float = 0.0
+    still_y: float = 0.0
+    """Where the pose last was more than 5 mm from the place before, m, WORLD frame ..."""
+    still_way_x: float = 0.0
+    still_way_y: float = 0.0
+    """... and the way by odometry then."""
     pose_run: int = 0
     """Consecutive poses that disagree with odometry."""
     command_run: int = 0

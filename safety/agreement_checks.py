@@ -22,20 +22,22 @@ MARK_M, MARK_NS = 0.04, 400_000_000
 """A new moment is kept after this way and this time ..."""
 MARK_AT_REST_NS = 5_000_000_000
 """... or after this time, at rest."""
+AT_REST_NS = 500_000_000
+"""A base that still moves this long after the command became zero is for F34 and F39."""
 GAP_S = 0.25
 """A longer pause of this host does not count as motion: the base has stopped by then."""
 RUN = 3
 """Consecutive samples that must disagree: one may be a flaw of motion capture."""
 DIRECTION_M = 0.01
 """A shorter way has no direction."""
-STILL_SHARE = 0.25
-"""A pose that covers less than this share of the way stands still (F43)."""
+STILL_M, STILL_WAY_M = 0.005, 0.01
+"""A pose that keeps within this of one place, over this way by odometry, stands still (F43)."""
 
 FLOOR_M = 0.006
 """Noise of two poses (0.5 mm each) eight times over."""
 NOISE_M_PER_SQRT_S = 0.006
 """Noise of odometry: 0.01 m/s at 50 Hz adds up to 1.4 mm in a second, and with the root of the time."""
-TIMING_S = 0.06
+TIMING_S = 0.04
 """Age and latency of poses and odometry: their difference may change by this much."""
 SLIP = 0.1
 """Wheels may lose this share of their way ..."""
@@ -75,9 +77,11 @@ def check(
         return replace(state, motion=replace(motion, pose_ns=state.pose_ns, marks=(_mark(motion, state),))), []
     now = _mark(motion, state)
     if state.pose_ns != motion.pose_ns and not state.pose_jumps and not settings.pose_is_odometry:
-        off, still = max((_of_pose(mark, now, inp) for mark in motion.marks), key=lambda found: found[0])
-        motion = replace(motion, pose_ns=state.pose_ns, pose_run=motion.pose_run + 1 if off > 1.0 else 0)
-        if motion.pose_run >= RUN and still:
+        off = max(_of_pose(mark, now, inp) for mark in motion.marks)
+        motion = _note_place(
+            replace(motion, pose_ns=state.pose_ns, pose_run=motion.pose_run + 1 if off > 1.0 else 0), now
+        )
+        if motion.pose_run >= RUN and _way_at_one_place(motion) > STILL_WAY_M:
             faults.append(Finding("F43", off))
         elif motion.pose_run >= RUN:
             faults.append(Finding("F37", off))
@@ -97,6 +101,8 @@ def _add_up(motion: MotionState, state: SafetyState, inp: TickInput) -> MotionSt
         way = (0.0, 0.0, 0.0)
     x, y = rotated(way[0], way[1], state.pose_yaw)
     sent_x, sent_y = rotated(sent.vx * time_s, sent.vy * time_s, state.pose_yaw)
+    if state.zero_since_ns and inp.now_ns - state.zero_since_ns > AT_REST_NS:
+        sent_x, sent_y = x, y
     return replace(
         motion,
         agreed_ns=inp.now_ns,
@@ -134,18 +140,29 @@ def _kept(marks: tuple[MotionMark, ...], now: MotionMark) -> tuple[MotionMark, .
     return (*marks, now)[-MARKS:] if due else marks
 
 
-def _of_pose(then: MotionMark, now: MotionMark, inp: TickInput) -> tuple[float, bool]:
-    """Return how far pose and odometry differ since then, as a share of what is allowed, and whether the pose stood."""
+def _note_place(motion: MotionState, now: MotionMark) -> MotionState:
+    """Keep the place of the pose, unless it is still the one that is kept."""
+    if math.hypot(now.x - motion.still_x, now.y - motion.still_y) <= STILL_M:
+        return motion
+    return replace(motion, still_x=now.x, still_y=now.y, still_way_x=now.way_x, still_way_y=now.way_y)
+
+
+def _way_at_one_place(motion: MotionState) -> float:
+    """Return the way by odometry (m) since the pose came to the place where it still is."""
+    return math.hypot(motion.way_x - motion.still_way_x, motion.way_y - motion.still_way_y)
+
+
+def _of_pose(then: MotionMark, now: MotionMark, inp: TickInput) -> float:
+    """Return how far pose and odometry differ since then, as a share of what is allowed."""
     x, y = now.way_x - then.way_x, now.way_y - then.way_y
-    went_x, went_y = now.x - then.x, now.y - then.y
     time_s = (now.at_ns - then.at_ns) * 1e-9
     way_m = math.hypot(x, y)
     floor_m = FLOOR_M + NOISE_M_PER_SQRT_S * math.sqrt(time_s) + TIMING_S * _speed(way_m, time_s, inp)
-    off = _share(x, y, went_x - x, went_y - y, _Allowed(floor_m, SLIP, AHEAD, ACROSS))
+    off = _share(x, y, now.x - then.x - x, now.y - then.y - y, _Allowed(floor_m, SLIP, AHEAD, ACROSS))
     turned = now.way_yaw - then.way_yaw
     off_rad = abs(math.remainder(now.yaw - then.yaw - turned, math.tau))
     allowed_rad = TURN_FLOOR_RAD + TURN_NOISE_RAD_PER_SQRT_S * math.sqrt(time_s) + SLIP * abs(turned)
-    return max(off, off_rad / allowed_rad), math.hypot(went_x, went_y) < STILL_SHARE * way_m
+    return max(off, off_rad / allowed_rad)
 
 
 def _of_command(then: MotionMark, now: MotionMark, inp: TickInput) -> float:
