@@ -18,6 +18,8 @@ from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Operator, Phase, 
 FRESH_NS = 100_000_000
 SETTLE_PACKETS = 20
 """Packets needed from each device before the run starts."""
+MOST_RESUMES = 3
+"""After these the operator looks for the cause and starts anew."""
 OVERDUE_CONTACT_M = 0.5
 """Without contact this far beyond the expected place, the object is considered missing."""
 BACKWARD_RAD = math.pi / 2
@@ -232,7 +234,10 @@ def _lost_hold(
     settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float], along: float
 ) -> ControlState:
     state = replace(state, speed=0.0)
-    if inp.operator == Operator.RESUME:
+    if inp.operator == Operator.RESUME and state.resumes >= MOST_RESUMES:
+        state = replace(state, resume_refused=True)
+    elif inp.operator == Operator.RESUME:
+        state = replace(state, resumes=state.resumes + 1)
         if state.contact_seen:
             return _enter(
                 state,

@@ -223,6 +223,10 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     felt_N: float = 0.0
     """Mean force along the motion over half a second, while a contact is sought."""
     contact: ContactState = ContactState()
+    resumes: int = 0
+    """How often the operator has resumed the push."""
+    resume_refused: bool = False
+    """Whether a further resume was refused in this rest."""
 
 
 class ForceState(msgspec.Struct, frozen=True, gc=False):
@@ -255,6 +259,71 @@ class ForceState(msgspec.Struct, frozen=True, gc=False):
     """For how long in all the force of this push has been higher than it should be."""
     histogram: tuple[U32, ...] = ()
     """How often the force of this push was seen in each newton, from 0 on; all larger ones come last."""
+
+
+class MotionMark(msgspec.Struct, frozen=True, gc=False):
+    """One moment to which a later one is compared: the pose, and the ways that odometry and command add up to.
+
+    m, rad, WORLD frame; both ways are turned by the measured heading.
+    """
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/MotionMark"
+    at_ns: int = 0
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    way_x: float = 0.0
+    way_y: float = 0.0
+    way_yaw: float = 0.0
+    sent_x: float = 0.0
+    sent_y: float = 0.0
+
+
+class MotionState(msgspec.Struct, frozen=True, gc=False):
+    """How far the base has come: by pose, by odometry and by what was sent to it."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/MotionState"
+    group: int = 0
+    """0 before the first motion, 1 approach, 2 push, 3 retreat; what follows counts within it."""
+    at_ns: int = 0
+    sent_m: float = 0.0
+    measured_m: float = 0.0
+    moving_ns: int = 0
+    """Time in motion."""
+    vx: float = 0.0
+    vy: float = 0.0
+    """Smoothed measured velocity, m/s, BODY frame."""
+    measured_ns: int = 0
+    resumes: int = 0
+    """How many of the operator's resumes have been allowed for."""
+    from_x: float = 0.0
+    from_y: float = 0.0
+    """Where the base stood as the group began, m, WORLD frame."""
+    lead_x: float = 0.0
+    lead_y: float = 0.0
+    """Where the directions that control asked for lead from there, m, WORLD frame."""
+    aside_run: int = 0
+    """Consecutive ticks in which the base went elsewhere."""
+    agreed_ns: int = 0
+    """The time up to which the ways below are added up; 0 before the first motion."""
+    pose_ns: int = 0
+    way_x: float = 0.0
+    way_y: float = 0.0
+    way_yaw: float = 0.0
+    sent_x: float = 0.0
+    sent_y: float = 0.0
+    still_x: float = 0.0
+    still_y: float = 0.0
+    """Where the pose last was more than 5 mm from the place before, m, WORLD frame ..."""
+    still_way_x: float = 0.0
+    still_way_y: float = 0.0
+    """... and the way by odometry then."""
+    pose_run: int = 0
+    """Consecutive poses that disagree with odometry."""
+    command_run: int = 0
+    """Consecutive ticks in which odometry disagrees with the command."""
+    marks: tuple[MotionMark, ...] = ()
+    """Oldest first."""
 
 
 class WorkspaceState(msgspec.Struct, frozen=True, gc=False):
@@ -320,6 +389,7 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     force: ForceState = ForceState()
     workspace: WorkspaceState = WorkspaceState()
     clock: ClockState = ClockState()
+    motion: MotionState = MotionState()
 
 
 class EnvelopeState(msgspec.Struct, frozen=True, gc=False):

@@ -7,6 +7,7 @@ tick at which the fault can be seen to the first reduced or zero command that le
 from __future__ import annotations
 
 from enum import StrEnum
+from operator import attrgetter
 
 import msgspec
 
@@ -114,6 +115,17 @@ FAULTS: dict[str, Fault] = dict(
             2,
             measured="room that is left, negative where there is too little",
             limit=0.0,
+            unit="m",
+        ),
+        _row(
+            "R07",
+            "the first pose is not a place in a room",
+            Mode.STOP,
+            _L,
+            1,
+            4,
+            measured="the larger coordinate",
+            limit=1000.0,
             unit="m",
         ),
         _row(
@@ -365,12 +377,42 @@ FAULTS: dict[str, Fault] = dict(
             unit="m/s",
         ),
         _row("F36", "the commanded velocity was beyond the envelope and was clamped", _WARN, _A, 0),
+        _row(
+            "F33-way",
+            "odometry does not go the way that is sent to the base",
+            Mode.STOP,
+            _L,
+            300,
+            measured="difference of the ways, as a share of what is allowed",
+            limit=1.0,
+            unit="",
+        ),
+        _row(
+            "F37",
+            "pose and odometry disagree on how the base moves",
+            Mode.STOP,
+            _L,
+            300,
+            measured="difference of the ways, as a share of what is allowed",
+            limit=1.0,
+            unit="",
+        ),
         _row("F38", "the base is stopped by its emergency stop or its motors are off", Mode.STOP, _L, 2),
         _row("F39", "the base did not come to rest within 5 s: its odometry still shows motion", Mode.STOP, _L, 1),
         _row("F40-slow", "the base pose is late", Mode.SLOW, _A, 5, measured="age of the pose", limit=None, unit="ms"),
         _row("F40-stop", "the base pose is lost", Mode.STOP, _L, 12, measured="age of the pose", limit=None, unit="ms"),
         _row("F41", "the base pose jumps", Mode.STOP, _L, 3),
         _row("F42", "the base pose is not a valid number", Mode.STOP, _L, 1),
+        _row(
+            "F43",
+            "the pose stands still while odometry moves",
+            Mode.STOP,
+            _L,
+            150,
+            measured="difference of the ways, as a share of what is allowed",
+            limit=1.0,
+            unit="",
+        ),
         _row(
             "F44",
             "the base has turned away from its heading",
@@ -380,6 +422,66 @@ FAULTS: dict[str, Fault] = dict(
             measured="heading error",
             limit="max_heading_error",
             unit="rad",
+        ),
+        _row(
+            "F45-approach",
+            "the search for contact has travelled further than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="way of this search, as sent or measured",
+            limit="phases.approach_m",
+            unit="m",
+        ),
+        _row(
+            "F45-push",
+            "the push has travelled further than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="way of the push, as sent or measured",
+            limit="phases.push_m",
+            unit="m",
+        ),
+        _row(
+            "F45-retreat",
+            "the retreat has travelled further than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="way of the retreat, as sent or measured",
+            limit="phases.retreat_m",
+            unit="m",
+        ),
+        _row(
+            "F46-approach",
+            "the search for contact takes longer than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="time in motion",
+            limit="phases.approach_s",
+            unit="s",
+        ),
+        _row(
+            "F46-push",
+            "the push takes longer than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="time in motion",
+            limit="phases.push_s",
+            unit="s",
+        ),
+        _row(
+            "F46-retreat",
+            "the retreat takes longer than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="time in motion",
+            limit="phases.retreat_s",
+            unit="s",
         ),
         _row(
             "F47",
@@ -433,6 +535,17 @@ FAULTS: dict[str, Fault] = dict(
         ),
         _row("F52", "the contact force is lost: turning back", _WARN, _A, 0, 6),
         _row("F52-hold", "the contact force stays lost", Mode.HOLD, _A, 1, 6),
+        _row(
+            "F52-refused",
+            "a further resume was refused: look for the cause and start a new push",
+            Mode.HOLD,
+            _A,
+            1,
+            6,
+            measured="resumes of this push",
+            limit=3.0,
+            unit="",
+        ),
         _row(
             "F53",
             "no contact within 0.5 m of where it was expected",
@@ -495,6 +608,16 @@ FAULTS: dict[str, Fault] = dict(
             unit="ticks",
         ),
         _row("F58", "the law returned a direction that is not a number", Mode.STOP, _L, 1),
+        _row(
+            "F59",
+            "the base does not move in the direction that was asked for",
+            Mode.STOP,
+            _L,
+            100,
+            measured="angle between the way by pose and the way asked for",
+            limit=15.0,
+            unit="degrees",
+        ),
         _row("F60-late", "ticks of the loop were skipped", _WARN, _A, 0),
         _row(
             "F60-slow",
@@ -568,7 +691,7 @@ FAULTS: dict[str, Fault] = dict(
 
 def limit_of(fault: Fault, settings: SafetySettings) -> float | None:
     """Return the limit of a row in its unit, None where it has none or it depends on the moment."""
-    return getattr(settings, fault.limit) if isinstance(fault.limit, str) else fault.limit
+    return float(attrgetter(fault.limit)(settings)) if isinstance(fault.limit, str) else fault.limit
 
 
 def strongest(ids: tuple[str, ...]) -> Mode:

@@ -11,7 +11,7 @@ from robot_io.rig.config import RigConfig
 from robot_io.rig.types import Matrix3
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
-from safety.motion_bounds import total_bounds
+from safety.motion_bounds import PhaseBounds, phase_bounds, total_bounds
 from safety.workspace import WorkspaceSettings
 
 SATURATED = 0.95
@@ -61,6 +61,9 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     total_moving: float
     """What the whole run can need, m and s; the gate latches beyond it."""
     workspace: WorkspaceSettings
+    phases: PhaseBounds
+    pose_is_odometry: bool
+    """Whether the pose is counted by the wheels, so that odometry cannot speak against it."""
 
     @classmethod
     def of(cls, rig: RigConfig) -> SafetySettings:
@@ -103,6 +106,8 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
             bounds.distance_m,
             bounds.moving_s,
             WorkspaceSettings.of(rig),
+            phase_bounds(rig),
+            rig.base.pose_source == "odometry",
         )
 
 

@@ -292,8 +292,9 @@ def lost(lateral=0.0, overrides=("control.force_filter_tau_s=0",)):
 
 def test_without_force_the_law_is_not_evaluated_and_the_pusher_turns_back():
     """2 cm left, k_y 0.2: the way back is -0.004 rad; turning there at 0.2 rad/s is 0.002 rad a tick."""
-    bench = pushing(("control.force_filter_tau_s=0",))
+    bench = FoldBench(("control.force_filter_tau_s=0",))
     bench.pose = replace(bench.pose, y=0.02)
+    bench.at_full_speed()
     for n in range(6):
         bench.pose = replace(bench.pose, y=0.02)
         bench.force_path = (15.0 * math.cos(0.05), 15.0 * math.sin(0.05))

@@ -132,6 +132,22 @@ def one_of(every: int) -> Alter:
     return alter
 
 
+def creeping_pose(x: float = 0.0, y: float = 0.0) -> Alter:
+    """Shift the pose a little further each tick: m/s."""
+    return lambda inp, n: shifted_pose(x * 0.01 * (n + 1), y * 0.01 * (n + 1))(inp, n)
+
+
+def turned_way(degrees: float, from_x: float) -> Alter:
+    """Let the pose go aside of where the base goes, from the place where its x is `from_x`."""
+
+    def alter(inp: TickInput, n: int) -> TickInput:
+        way = inp.base.pose.x - from_x
+        turn = math.radians(degrees)
+        return shifted_pose(way * (math.cos(turn) - 1.0), way * math.sin(turn))(inp, n)
+
+    return alter
+
+
 def spike(newton: float) -> Alter:
     """Press once, in the first tick only."""
     return lambda inp, n: pressed(newton)(inp, n) if n == 0 else inp
@@ -261,6 +277,26 @@ def approaching_in_vain() -> FoldBench:
     return bench
 
 
+def far_on(phase: Phase, after_ticks: int = 0, **changes: float) -> Callable[[], FoldBench]:
+    """Return a way to a bench that has nearly used up what safety allows this phase."""
+
+    def start() -> FoldBench:
+        bench = pushing() if phase == Phase.PUSH else FoldBench().run_to(phase)
+        for _ in range(after_ticks):
+            bench.fold()
+        motion = replace(bench.state.safety.motion, **changes)
+        bench.state = replace(bench.state, safety=replace(bench.state.safety, motion=motion))
+        return bench
+
+    return start
+
+
+def resumed_three_times() -> FoldBench:
+    bench = lost_for_good()
+    bench.state = replace(bench.state, control=replace(bench.state.control, resumes=3))
+    return bench
+
+
 def pushed(phase: Phase) -> FoldBench:
     """Return a bench that has pushed its distance and come to a phase behind that."""
     return pushing().run_to(phase)
@@ -296,7 +332,7 @@ def alternate_torque(inp: TickInput, n: int) -> TickInput:
     return reading(torque=(21.0 + BIAS[3], BIAS[4] + 0.001 * n, BIAS[5]))(inp, n)
 
 
-CREEPS = base(odometry=BodyTwist(0.015, 0.0, 0.0))
+CREEPS = then(base(odometry=BodyTwist(0.015, 0.0, 0.0)), creeping_pose(x=0.015))
 """Above what counts as rest, below what counts as moving (F34) or as ignoring the command (F33)."""
 NAN = math.nan
 SERVO = ('arm.hold="servo"',)
@@ -380,9 +416,22 @@ SCENARIOS = [
         "F31-hold", "half-open", old("base", "odometry_received_ns", "pose_received_ns", "newest_inbound_ns"),
         also=frozenset({"F40-slow"}),
     ),
-    Scenario("F33", "stands", base(odometry=BodyTwist())),
-    Scenario("F33", "goes elsewhere", base(odometry=BodyTwist(0.1, 0.06, 0.0))),
-    Scenario("F33", "stands while approaching", base(odometry=BodyTwist()), approaching_at_full_speed),
+    Scenario("F33", "stands", then(base(odometry=BodyTwist()), creeping_pose(x=-0.1))),
+    Scenario("F33", "goes elsewhere", then(base(odometry=BodyTwist(0.1, 0.06, 0.0)), creeping_pose(y=0.06))),
+    Scenario("F33", "stands while approaching", then(base(odometry=BodyTwist()), creeping_pose(x=-0.05)),
+             approaching_at_full_speed),
+    Scenario("F33-way", "a third too slow", then(base(odometry=BodyTwist(0.067, 0.0, 0.0)), creeping_pose(x=-0.033))),
+    Scenario("F33-way", "a quarter too slow", then(base(odometry=BodyTwist(0.075, 0.0, 0.0)), creeping_pose(x=-0.025))),
+    Scenario("F33-way", "a third too fast", then(base(odometry=BodyTwist(0.133, 0.0, 0.0)), creeping_pose(x=0.033))),
+    Scenario("F33-way", "aside", then(base(odometry=BodyTwist(0.0966, 0.0259, 0.0)), creeping_pose(-0.0034, 0.0259))),
+    Scenario("F37", "mirrored", creeping_pose(x=-0.2)),
+    Scenario("F37", "a quarter too short", creeping_pose(x=-0.025)),
+    Scenario("F37", "a third too long", creeping_pose(x=0.033)),
+    Scenario("F37", "turned left", creeping_pose(-0.0034, 0.0259)),
+    Scenario("F37", "turned right", creeping_pose(-0.0034, -0.0259)),
+    Scenario("F37", "drifts", creeping_pose(y=0.05)),
+    Scenario("F37", "drifts while approaching", creeping_pose(y=-0.05), approaching_at_full_speed),
+    Scenario("F37", "turns", lambda inp, n: shifted_pose(yaw=0.001 * n)(inp, n)),
     Scenario(
         "F34", "rolls on", then(operator(Operator.STOP), base(odometry=BodyTwist(0.1, 0.0, 0.0))),
         also=frozenset({"F64"}),
@@ -394,7 +443,8 @@ SCENARIOS = [
     Scenario("F38", "stop pressed", base(status=BaseStatus(True, True, 26.0))),
     Scenario("F38", "motors off", base(status=BaseStatus(False, False, 26.0))),
     Scenario("F39", "creeps after the push", CREEPS, lambda: pushed(Phase.REST), warm=500),
-    Scenario("F39", "creeps while the zero is checked", CREEPS, lambda: pushed(Phase.CHECK), warm=500),
+    Scenario("F39", "creeps while the zero is checked", CREEPS, lambda: pushed(Phase.CHECK), warm=500,
+             also=frozenset({"F45-retreat"})),
     Scenario("F39", "creeps after the force was lost", then(CREEPS, without_contact), lost_for_good, warm=500,
              also=frozenset({"F52-hold"})),
     Scenario("F40-slow", "silent", old("base", "pose_received_ns")),
@@ -407,6 +457,8 @@ SCENARIOS = [
         Scenario("F42", f"NaN {key}", base(pose=replace(Pose2D(), **{key: NAN})))
         for key in ("x", "y", "yaw")
     ),
+    Scenario("F43", "stands", creeping_pose(x=-0.1)),
+    Scenario("F43", "stands while approaching", creeping_pose(x=-0.05), approaching_at_full_speed),
     Scenario("F44", "turned left", shifted_pose(yaw=0.088)),
     Scenario("F44", "turned right", shifted_pose(yaw=-0.088)),
     Scenario("F67", "latched", base(latched=True, latch_cause=1)),
@@ -414,6 +466,22 @@ SCENARIOS = [
     Scenario("F67-late", "frozen", old("base", "published_ns")),
     Scenario("F47", "further than it can need", base(latched=True, latch_cause=14, travel_m=9.0)),
     Scenario("F48", "longer than it can need", base(latched=True, latch_cause=15, moving_s=900.0)),
+    # What the shipped rig can need: 0.655 m and 28.2 s, 3.13 m and 74.6 s, 0.105 m and 6.2 s (docs/safety.md).
+    Scenario("F45-approach", "search", without_contact, far_on(Phase.APPROACH, 80, sent_m=0.6549)),
+    Scenario("F45-approach", "search, measured", without_contact, far_on(Phase.APPROACH, 80, measured_m=0.6549)),
+    Scenario("F45-push", "push", creeping_pose(), far_on(Phase.PUSH, sent_m=3.1299)),
+    Scenario("F45-retreat", "retreat", creeping_pose(), far_on(Phase.RETREAT, 40, measured_m=0.1049)),
+    Scenario("F46-approach", "search", without_contact, far_on(Phase.APPROACH, 80, moving_ns=28_195_000_000)),
+    Scenario("F46-push", "push", creeping_pose(), far_on(Phase.PUSH, moving_ns=74_595_000_000)),
+    Scenario("F46-retreat", "retreat", creeping_pose(), far_on(Phase.RETREAT, 40, moving_ns=6_195_000_000)),
+    Scenario("F59", "aside in the approach", turned_way(20.0, -1.0), lambda: FoldBench().run_to(Phase.APPROACH),
+             warm=85, also=frozenset({"F37"})),
+    Scenario("F59", "aside in the push", turned_way(-20.0, -0.95), lambda: FoldBench().run_to(Phase.PUSH),
+             warm=20, also=frozenset({"F37"})),
+    Scenario("F52-refused", "a fourth time", then(operator(Operator.RESUME), without_contact), resumed_three_times,
+             also=frozenset({"F52-hold"})),
+    Scenario("R07", "in millimetres", shifted_pose(x=-1500.0), FoldBench, warm=19),
+    Scenario("R07", "far aside", shifted_pose(y=1000.1), FoldBench, warm=19),
     # --- force and task
     Scenario("F50-slow", "pressed", pressed(101.0)),
     Scenario("F50-stop", "pressed", pressed(151.0)),

@@ -10,11 +10,13 @@ import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
 from safety import (
+    agreement_checks,
     arm_checks,
     base_checks,
     clock_checks,
     force_checks,
     host_checks,
+    motion_checks,
     sensor_checks,
     stuck_checks,
     supervisor,
@@ -87,7 +89,11 @@ WITHOUT_EVIDENCE = ("F09", "F09-before", "F36", "F53-early")
 """Rows whose scenario begins before there can be anything to see."""
 
 
-@pytest.mark.parametrize("scenario", [s for s in SCENARIOS if s.row not in WITHOUT_EVIDENCE], ids=str)
+BY_WAY = ("F33-way", "F37", "F43", "F59")
+"""Rows that go by the way, not by the time: see the tests of these checks."""
+
+
+@pytest.mark.parametrize("scenario", [s for s in SCENARIOS if s.row not in (*WITHOUT_EVIDENCE, *BY_WAY)], ids=str)
 def test_the_row_is_not_raised_before_there_is_evidence(scenario):
     expected = EVIDENCE.get(str(scenario), EVIDENCE.get(scenario.row, 0))
     assert ticks_to(scenario, 300)[1] == expected
@@ -166,6 +172,8 @@ CHECKS = {
     "safety.task_checks": task_checks,
     "safety.supervisor": supervisor,
     "safety.workspace_checks": workspace_checks,
+    "safety.motion_checks": motion_checks,
+    "safety.agreement_checks": agreement_checks,
 }
 
 
