@@ -17,6 +17,7 @@ from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
+from tools.run.awake import awake
 from tools.run.bounds import bounds_lines, bounds_of, check_room
 from tools.run.run_facts import level_of
 from tools.run.run_state import status_line
@@ -190,7 +191,8 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         from tools.run.launcher import Launcher
 
         launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
-        figures = launcher.run()
+        with awake():
+            figures = launcher.run()
     except BaseException:
         if launcher is None or not launcher.began:
             run_dir.discard(out)
