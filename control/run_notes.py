@@ -25,7 +25,7 @@ class RunNotes:
 
     def note(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
         """Record one tick and the state after it."""
-        self.course.note(after.control.phase, after.control.progress_m, after.control.lateral_m)
+        self.course.note(after.control.phase, after.control.lateral_m)
         if not self._first_ns:
             self._first_ns = inp.now_ns
         if (output.mode, output.faults) == self._last:
@@ -67,6 +67,8 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "log_dropped": inp.host.log_dropped,
         "contact_seen": control.contact_seen,
         "residual_N": control.residual_N if math.isfinite(control.residual_N) else None,
+        "lost_m": control.lost_m,
+        "lost_times": control.lost_count,
         "early_contact": control.early_contact,
         "force_before_contact_N": force_N if math.isfinite(force_N := control.force_before_contact_N) else None,
         "bias_force_N": list(control.bias_force),

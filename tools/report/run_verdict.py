@@ -72,9 +72,8 @@ def trust_rows(trust: tuple[TrustItem, ...]) -> list[tuple[str, str, str]]:
 def _figures(run: RunData, last: ControlTick) -> dict[str, Any]:
     """Return the figures of the run as control reports them, its course from the kept ticks."""
     course, ticks = PushCourse(), run.ticks
-    start_m = last.after.control.contact_from_m
-    for phase, along_m, lateral_m in zip(ticks["phase"], ticks["along_m"], ticks["lateral_m"], strict=True):
-        course.note(int(phase), float(along_m) - start_m, float(lateral_m))
+    for phase, lateral_m in zip(ticks["phase"], ticks["lateral_m"], strict=True):
+        course.note(int(phase), float(lateral_m))
     counts = {"fault_counts": {span.name: 1 for span in run.faults}}
     return {**outcome(last.input, last.after, last.output), **course.figures(), **counts}
 
