@@ -111,6 +111,9 @@ def main(argv: Sequence[str]) -> int:
             where = str(error.filename or "")  # empty: the disk that stdout goes to
             with ignoring_output_errors():
                 return report(EnvironmentFault("there is no space left on the disk", where=where), as_json=as_json)
+        if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+            few = EnvironmentFault("too many open files", do="Allow more: ulimit -n 1024")
+            return report(few, as_json=as_json)
         return report(unexpected(error), as_json=as_json)
     return code
 

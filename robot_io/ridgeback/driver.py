@@ -15,7 +15,7 @@ from typing import Any, Literal, Self
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
 from robot_io.driver import DriverBase, no_more_options
-from robot_io.errors import ConfigError, DeviceNotReady, DeviceUnreachable
+from robot_io.errors import ConfigError, DeviceUnreachable
 from robot_io.messages import (
     BaseFeed,
     BodyTwist,
@@ -30,6 +30,7 @@ from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
 from robot_io.ridgeback.open_socket import parse_url
 from robot_io.ridgeback.pending import PendingSamples
 from robot_io.ridgeback.preflight import check_topics
+from robot_io.ridgeback.refused import RefusedMessages
 from robot_io.ridgeback.rosbridge_codec import (
     Published,
     decode_frame,
@@ -93,6 +94,7 @@ class Ridgeback(DriverBase):
         self._state = LinkState.CLOSED
         self._cause = ""
         self._pending = PendingSamples()
+        self._refused = RefusedMessages()
         self._last_ping_ns = 0
         self._unheard_ns = 0  # when the oldest command left that may not have been heard back; 0 when there is none
         self._started = False
@@ -153,11 +155,7 @@ class Ridgeback(DriverBase):
             if link is None:
                 raise DeviceUnreachable(self._cause or "not open", where=self.url, do="Open the driver again")
             if not link.wait_readable(until_ns):
-                raise DeviceNotReady(
-                    f"no message on {', '.join(silent)} within {FIRST_MESSAGE_TIMEOUT_S:g} s",
-                    where=self.url,
-                    do="Check that its publisher runs (motion capture: is the base seen?) and its name in the rig file",
-                )
+                raise self._refused.explain(silent, self.url, FIRST_MESSAGE_TIMEOUT_S)
             self._receive()
         self._started = True
         if self._link is not None:
@@ -224,6 +222,7 @@ class Ridgeback(DriverBase):
     def _reset(self) -> None:
         self._cause = ""
         self._pending.clear()
+        self._refused = RefusedMessages()
         self._reader.reset()
         self.newest_inbound_ns = self.newest_pong_ns = self.sent_ns = self._last_ping_ns = 0
         self._unheard_ns = 0
@@ -246,8 +245,9 @@ class Ridgeback(DriverBase):
                     continue
                 self.newest_inbound_ns = received_ns
                 samples = self._reader.read(frame, received_ns)
-            except ValueError:
+            except ValueError as error:
                 self._counters["undecodable"] += 1
+                self._refused.note(text, error)
                 continue
             for sample in samples:
                 if isinstance(sample.value, CommandEcho):

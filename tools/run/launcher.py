@@ -6,8 +6,7 @@
     arm         the ur_rtde library, publishing a shared record
     control     the loop: sensor, law, supervisor, envelope, one frame to the gate per tick
 
-How they are connected: `processes`. The launcher itself has no device and no real-time work: a blocked terminal
-never delays a tick.
+How they are connected: `processes`. The launcher itself has no device and no real-time work.
 """
 
 from __future__ import annotations
@@ -75,7 +74,7 @@ class Launcher:
             rig, seed=seed, saved=saved, log=self.log, kind_folder=kind_folder, on_spawn=self._listen
         )
         self._children = self._processes.children
-        self._began = False
+        self._began = self._ending = False
         self._stop_asked_ns = 0
         self._killed_by_operator = False
         self._gate_latch = ""
@@ -145,6 +144,8 @@ class Launcher:
         write_json(self._out / "processes.json", pids)
         self._wait_ready(names, READY_NS)
         self._warn_without_realtime()
+        if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full
+            raise errors[0]
         self._began = True
         self._processes.send_to_control(b"G")
 
@@ -168,9 +169,12 @@ class Launcher:
                 self._live.say(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
                 self._live.say(f"recorder: {event['error']['what']}")
-                self._processes.send_to_control(b"L")
+                if self._began:
+                    self._processes.send_to_control(b"L")
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
+            if child.name == "emulators" and not self._ending:
+                self._live.say("the emulators have ended: every emulated device is gone")
 
     def _wait_ready(self, names: list[str], within_ns: int) -> None:
         """Wait until all are ready. Raises PushError naming everything that failed and what to do about each."""
@@ -238,6 +242,7 @@ class Launcher:
 
     def _end(self) -> None:
         """End all: the gate by control's EOF, the recorder by that of all producers, the others by SIGTERM."""
+        self._ending = True
         self._processes.hang_up()
         control = self._children.get("control")
         if control is not None and control.ready is None:
