@@ -18,7 +18,7 @@ from control.pacer import wake
 from control.run_notes import RunNotes
 from control.silence import Silence
 from control.timing import LoopTiming
-from robot_io.clock import ClockNs, monotonic_ns
+from robot_io.clock import ClockNs, asleep_ns, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
 from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.ring import Ring
@@ -97,6 +97,7 @@ class ControlLoop:
         operator_fd: int,
         on_status: Callable[[TickInput, TickState, TickOutput], None],
         clock: ClockNs = monotonic_ns,
+        asleep: Callable[[], int | None] = asleep_ns,
     ) -> None:
         self._fold = fold
         self._state = state
@@ -106,6 +107,8 @@ class ControlLoop:
         self._operator_fd = operator_fd
         self._on_status = on_status
         self._clock = clock
+        self._read_asleep_ns = asleep
+        self._asleep_ns = 0
         self._loop = EventLoop()
         self._timer: Timer | None = None
         self._tick = -1
@@ -250,6 +253,9 @@ class ControlLoop:
         record = self._arm.read()
         if record is not None:
             self._arm_record = record
+        asleep_ns = self._read_asleep_ns()
+        if asleep_ns is not None:
+            self._asleep_ns = asleep_ns
         readings, self._readings = self._readings, []
         operator, self._operator = self._operator, Operator.NONE
         return TickInput(
@@ -266,6 +272,7 @@ class ControlLoop:
                 self._ring.dropped,
                 self._launcher.so_far_ns(now_ns),
                 self._recorder.so_far_ns(now_ns),
+                self._asleep_ns,
             ),
             ft_input(readings, self._health, self._taken),
             self._arm_record,

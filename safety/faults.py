@@ -407,6 +407,16 @@ FAULTS: dict[str, Fault] = dict(
             unit="ms",
         ),
         _row(
+            "F61",
+            "this machine was suspended, or its clock stood still",
+            Mode.STOP,
+            _L,
+            1,
+            measured="time that passed unseen between two ticks",
+            limit=20.0,
+            unit="ms",
+        ),
+        _row(
             "F63",
             "the log is not complete: its recorder is gone or frozen, or the disk too slow",
             Mode.HOLD,

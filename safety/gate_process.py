@@ -19,7 +19,7 @@ from typing import TypeVar
 import msgspec
 from msgspec.structs import astuple, replace
 
-from robot_io.clock import NS_PER_MS, monotonic_ns
+from robot_io.clock import NS_PER_MS, asleep_ns, monotonic_ns
 from robot_io.driver import Base
 from robot_io.errors import PushError
 from robot_io.ipc.event_loop import EventLoop
@@ -38,6 +38,8 @@ from safety.motion_bounds import TravelLimits
 PRIORITY = 82
 CLOCK_NS = 2 * NS_PER_MS
 """How often silence is judged and repeats are sent."""
+MOST_FRAMES = 200
+"""Frames of control read before they are judged: two seconds of them, more than a gate in order ever lets wait."""
 
 
 class GateJob(msgspec.Struct, frozen=True):
@@ -110,11 +112,11 @@ class GateProcess:
             self._loop.stop()
 
     def _read_control(self) -> None:
-        """Read every waiting frame, before silence is judged."""
+        """Read the waiting frames, before silence is judged."""
         began_ns = monotonic_ns()
         frames: list[GateFrame | None] = []
         gone = bool(self._shell.zeros_since_ns)
-        while not gone:
+        while not gone and len(frames) < MOST_FRAMES:
             try:
                 payload = self._control.recv(FRAME_BYTES + 1)
             except BlockingIOError:
@@ -141,7 +143,7 @@ class GateProcess:
 
     def _send_due(self) -> None:
         now_ns = monotonic_ns()
-        self._shell, latching = self._shell.on_leaving(now_ns)
+        self._shell, latching = self._shell.on_asleep(asleep_ns()).on_leaving(now_ns)
         if latching is not None:
             self._log.latched(now_ns, *astuple(latching))
             self._status.say("latched", latch=int(latching.latch), text=latching.text)

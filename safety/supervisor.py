@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Mode, Phase, SafetyState, TickInput
-from safety import arm_checks, base_checks, host_checks, sensor_checks, task_checks, workspace_checks
+from safety import arm_checks, base_checks, clock_checks, host_checks, sensor_checks, task_checks, workspace_checks
 from safety.faults import FAULTS, Clears, strongest
 from safety.finding import value_of
 from safety.settings import SafetySettings
@@ -108,6 +108,8 @@ def _gather(
     clamped: bool,
 ) -> tuple[SafetyState, list[str]]:
     state, faults = host_checks.check(settings, state, inp)
+    state, found = clock_checks.check(state, inp)
+    faults += found
     if state.first_ns == 0:
         state = replace(state, first_ns=inp.now_ns)
     faults += task_checks.check(inp, control, wanted, state.first_ns)

@@ -1,8 +1,8 @@
 """One websocket connection without a thread and without blocking: the Sans-I/O client of `websockets` on a socket.
 
 Made for commands to a robot: a message leaves whole and now, or the link counts as lost. Nothing queues in
-front of it, nothing is resumed, and a lost link is reset (SO_LINGER 0), so that the kernel does not deliver
-the rest later. Only `connect` waits, bounded.
+front of it, and nothing is resumed. Reading is bounded, too: a flood of messages cannot hold its reader for longer
+than READ_NS. Only `connect` waits, bounded.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import select
 import socket
 import ssl
 import struct
+import time
 
 from websockets.client import ClientProtocol
 from websockets.exceptions import InvalidHandshake, InvalidMessage
@@ -19,7 +20,7 @@ from websockets.frames import Frame, Opcode
 from websockets.http11 import Response
 from websockets.protocol import State
 
-from robot_io.clock import NS_PER_S, ClockNs, monotonic_ns
+from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
 from robot_io.errors import DeviceError, DeviceProtocolError, DeviceUnreachable
 from robot_io.ridgeback.open_socket import START_THE_BRIDGE, open_socket, parse_url
 
@@ -28,11 +29,16 @@ CLOSE_TIMEOUT_S = 0.05
 SEND_BUFFER_BYTES = 16_384
 """Small: what does not fit into it is old before it arrives."""
 
+MOST_FRAMES = 200
+"""Frames read in one call ..."""
+READ_NS = 2 * NS_PER_MS
+"""... and processor time of this thread that it may take."""
 WOULD_BLOCK = (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError)
 """What a socket raises instead of waiting, plain or encrypted."""
 
 _RECEIVE_BYTES = 65_536
-_RECEIVES_PER_CALL = 16
+_PARSED_BYTES = 256
+"""Parsed between two looks at the bounds: at most 128 frames of two bytes, about a millisecond."""
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)
 
 
@@ -48,6 +54,10 @@ class WebSocketLink:
         self._protocol = protocol
         self._clock = clock
         self._parts: list[bytes] | None = None
+        self._unparsed = memoryview(b"")
+        self._unparsed_ns = 0
+        self.behind = False
+        """Whether the last `receive` left something unread because its bounds were reached."""
         self._lost: LinkLost | None = None
         self.newest_pong_ns = 0
         """When the server last answered a ping; 0 before the first answer."""
@@ -77,14 +87,17 @@ class WebSocketLink:
     def receive(self) -> list[tuple[bytes, int]]:
         """Return the texts that have arrived, each with its arrival time (ns); pings are answered on the way.
 
-        Raises LinkLost on EOF, error or a broken frame, after everything that came before it was returned.
+        At most about MOST_FRAMES, within READ_NS; `behind` tells whether more may wait. Raises LinkLost on EOF, error
+        or a broken frame, after everything that came before it was returned.
         """
         texts: list[tuple[bytes, int]] = []
         self._raise_if_lost()
+        frames, until_ns = 0, time.thread_time_ns() + READ_NS
+        self.behind = False
         try:
-            for _ in range(_RECEIVES_PER_CALL):
-                if not self._receive_once(texts):
-                    break
+            while not self.behind and self._read_more():
+                frames += self._parse(texts)
+                self.behind = frames >= MOST_FRAMES or time.thread_time_ns() > until_ns
         except LinkLost as lost:
             self._lost = lost
             if not texts:
@@ -160,24 +173,32 @@ class WebSocketLink:
         if isinstance(response, Response):
             self.server = response.headers.get("Server", "")
 
-    def _receive_once(self, texts: list[tuple[bytes, int]]) -> bool:
+    def _read_more(self) -> bool:
+        """Return whether there are bytes to parse, after a look into the socket where there were none."""
+        if self._unparsed:
+            return True
         try:
             data = self._socket.recv(_RECEIVE_BYTES)
         except WOULD_BLOCK:
             return False
         except OSError as error:
             raise LinkLost(f"connection lost ({error.strerror or error})") from error
-        now_ns = self._clock()
+        self._unparsed, self._unparsed_ns = memoryview(data), self._clock()
         # Acknowledge at once, or the server's Nagle algorithm holds its next message back for up to 40 ms.
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         if not data:
             raise LinkLost("connection closed by the bridge")
-        self._protocol.receive_data(data)
-        self._collect(texts, now_ns)
+        return True
+
+    def _parse(self, texts: list[tuple[bytes, int]]) -> int:
+        """Parse the next few bytes, append the texts in them, and return how many frames they ended."""
+        part, self._unparsed = self._unparsed[:_PARSED_BYTES], self._unparsed[_PARSED_BYTES:]
+        self._protocol.receive_data(bytes(part))
+        frames = self._collect(texts, self._unparsed_ns)
         self._flush()
         if self._protocol.state is not State.OPEN:
             raise LinkLost(self._why_closed())
-        return True
+        return frames
 
     def _why_closed(self) -> str:
         goodbye = self._protocol.close_rcvd
@@ -191,8 +212,9 @@ class WebSocketLink:
         if self._protocol.state is not State.OPEN:  # its goodbye came together with its handshake
             raise LinkLost(self._why_closed())
 
-    def _collect(self, texts: list[tuple[bytes, int]], now_ns: int) -> None:
-        for event in self._protocol.events_received():
+    def _collect(self, texts: list[tuple[bytes, int]], now_ns: int) -> int:
+        events = self._protocol.events_received()
+        for event in events:
             if not isinstance(event, Frame):
                 continue
             if event.opcode is Opcode.PONG:
@@ -206,6 +228,7 @@ class WebSocketLink:
                 if event.fin:
                     texts.append((b"".join(self._parts), now_ns))
                     self._parts = None
+        return len(events)
 
     def _flush(self) -> None:
         data = b"".join(self._protocol.data_to_send())

@@ -344,6 +344,8 @@ SCENARIOS = [
     Scenario("F60-slow", "30 ms", host(skipped=3), before=lambda b: b.skip(3), also=frozenset({"F60-late"})),
     Scenario("F60-slow", "three in a row", host(skipped=1), before=lambda b: b.skip(1),
              also=frozenset({"F60-late"})),
+    Scenario("F61", "suspended", host(asleep_ns=20_000_001)),
+    Scenario("F61", "its clock went back", host(asleep_ns=-20_000_001)),
     Scenario("F63", "gone", host(recorder_alive=False)),
     Scenario("F63", "frozen", silent("recorder_silent_ns")),
     Scenario("F63", "records lost", host(log_dropped=1)),

@@ -9,7 +9,16 @@ from msgspec.structs import replace
 import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
-from safety import arm_checks, base_checks, host_checks, sensor_checks, supervisor, task_checks, workspace_checks
+from safety import (
+    arm_checks,
+    base_checks,
+    clock_checks,
+    host_checks,
+    sensor_checks,
+    supervisor,
+    task_checks,
+    workspace_checks,
+)
 from safety.faults import FAULTS, Clears, strongest
 from tests.mutants import load, tree_of
 from tests.safety.fault_scenarios import BY_THE_GATE, SCENARIOS, Scenario
@@ -145,6 +154,7 @@ CHECKS = {
     "safety.arm_checks": arm_checks,
     "safety.base_checks": base_checks,
     "safety.host_checks": host_checks,
+    "safety.clock_checks": clock_checks,
     "safety.task_checks": task_checks,
     "safety.supervisor": supervisor,
     "safety.workspace_checks": workspace_checks,

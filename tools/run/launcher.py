@@ -74,11 +74,9 @@ class Launcher:
             rig, seed=seed, saved=saved, log=self.log, kind_folder=kind_folder, on_spawn=self._listen
         )
         self._children = self._processes.children
-        self._began = self._ending = False
-        self._stop_asked_ns = 0
-        self._killed_by_operator = False
+        self._began = self._ending = self._killed_by_operator = False
+        self._stop_asked_ns = self._status_ns = 0
         self._gate_latch = ""
-        self._status_ns = 0
 
     def run(self) -> dict[str, Any]:
         """Run to the end; return the figures. Raises PushError if the run did not start or its result is unknown."""

@@ -43,7 +43,7 @@ from tools.run.injected_gate import InjectedGateJob
 from tools.run.jobs import ArmKindJob, ControlJob, EmulatorJob
 from tools.run.recorder import Job as RecorderJob
 from tools.run.recorder import RingSource
-from tools.run.run_facts import level_of, run_facts
+from tools.run.run_facts import run_facts
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes without a drain by the recorder."""
@@ -159,9 +159,7 @@ class Processes:
         return rig
 
     def _start_recorder(self, config_text: str) -> None:
-        facts = run_facts(
-            level_of(self._rig), self._seed, in_contact=self._saved is not None, faults=self._rig.faults.inject
-        )
+        facts = run_facts(self._rig, self._seed, in_contact=self._saved is not None)
         facts["kernel"] = platform.release()
         rings = [RingSource(name, ring.fd) for name, ring in self._rings.items()]
         alive = [self._alive[name][0] for name in ("control", "gate", "world")]
