@@ -37,6 +37,11 @@ COMMANDS = {
         "one push, on hardware, emulated or simulated",
         ("push run emulated --distance-m 2", "push run sim --fast --seed 3 --json"),
     ),
+    "stop": Command(
+        "tools.commands.stop",
+        "stop the runs under way, or a rig's base by zeros",
+        ("push stop", "push stop emulated --json"),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",

@@ -29,6 +29,7 @@ from safety.gate import Latch
 from tools.kinds import name_of
 from tools.places import run_dir
 from tools.places.atomic_file import write_json
+from tools.places.running import announce, forget
 from tools.places.saved_tare import SavedTare
 from tools.run.figures_from_log import figures_from_log
 from tools.run.processes import Processes
@@ -94,12 +95,13 @@ class Launcher:
             return self._figures()
         finally:
             self._live.close()
+            forget()
             for child in self._children.values():
                 child.close()
 
     @property
     def began(self) -> bool:
-        """Return whether every device was ready and the loop was started."""
+        """Return whether the loop was started."""
         return self._began
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
@@ -138,8 +140,9 @@ class Launcher:
     def _start(self) -> None:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)
         names = self._processes.start_remaining(run_dir.write_config(self._out, self._rig))
-        pids = {"schema": 1, "launcher": os.getpid(), **self._processes.pids}
-        write_json(self._out / "processes.json", pids)
+        pids = {"launcher": os.getpid(), **self._processes.pids}
+        write_json(self._out / "processes.json", {"schema": 1, **pids})
+        announce(self._rig, pids)
         self._wait_ready(names, READY_NS)
         self._warn_without_realtime()
         if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full
@@ -219,15 +222,12 @@ class Launcher:
 
     def _stop(self) -> None:
         now_ns = monotonic_ns()
+        late = now_ns - self._stop_asked_ns > SECOND_STOP_NS
         if not self._stop_asked_ns:
             self._stop_asked_ns = now_ns
             self._live.say("stopping ...")
             self._processes.send_to_control(b"S")
-        elif (
-            now_ns - self._stop_asked_ns > SECOND_STOP_NS
-            and "control" in self._children
-            and not self._killed_by_operator
-        ):
+        elif late and "control" in self._children and not self._killed_by_operator:
             self._killed_by_operator = True
             self._live.say("stopping at once")
             self._children["control"].process.kill()
