@@ -76,4 +76,5 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "tared": control.tared,
         "held_joints_rad": list(control.held_joints),
         "arm_packets": inp.arm.packets,
+        "joints_rad": [q if math.isfinite(q) else None for q in inp.arm.joints.position],
     }

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, Mode, SafetyState, TickInput
-from safety.envelope import OVERSPEED_FACTOR, too_fast
+from safety.envelope import OVERSPEED_FACTOR, is_number, too_fast
 from safety.finding import NS_PER_MS, Finding
 from safety.gate import Latch
 from safety.settings import SafetySettings
@@ -17,6 +17,8 @@ STALE_HOLD_NS = 100_000_000
 STALE_STOP_NS = 250_000_000
 POSE_SLOW_PERIODS, POSE_STOP_PERIODS = 3, 6
 POSE_SLOW_FLOOR_NS, POSE_STOP_FLOOR_NS = 50_000_000, 120_000_000
+STATUS_LATE_NS = 3_000_000_000
+"""The base reports its stops and motors once a second."""
 GATE_RECORD_STOP_NS = 100_000_000
 OVERSPEED_SAMPLES = 2
 IGNORE_SHARE = 0.5
@@ -92,6 +94,9 @@ def _of_link(inp: TickInput) -> list[str]:
         faults.append(Finding("F31-stop", silent_ns / NS_PER_MS))
     elif silent_ns > STALE_HOLD_NS:
         faults.append(Finding("F31-hold", silent_ns / NS_PER_MS))
+    status_ns = inp.now_ns - base.status_received_ns if base.status_received_ns else 0
+    if status_ns > STATUS_LATE_NS:
+        faults.append(Finding("F38-late", status_ns / NS_PER_MS))
     if base.status_received_ns and (base.status.stop_engaged or not base.status.drivers_active):
         faults.append("F38")
     return faults
@@ -130,8 +135,10 @@ def _of_motion(settings: SafetySettings, state: SafetyState, inp: TickInput) -> 
     run, seq = state.overspeed_run, state.overspeed_seq
     if base.odometry_seq != seq:
         run, seq = (run + 1 if too_fast(settings.envelope, twist) else 0), base.odometry_seq
-    if run >= OVERSPEED_SAMPLES:
+    if run >= OVERSPEED_SAMPLES and is_number(twist):
         faults.append(Finding("F35", speed))
+    elif run >= OVERSPEED_SAMPLES:
+        faults.append("F49")
     sent = base.sent
     off = math.hypot(twist.vx - sent.vx, twist.vy - sent.vy)
     ignored = max(IGNORE_SHARE * math.hypot(sent.vx, sent.vy), IGNORE_LEAST_M_PER_S)

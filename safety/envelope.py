@@ -55,6 +55,11 @@ def reduces(new: BodyTwist, old: BodyTwist) -> bool:
     )
 
 
+def is_number(twist: BodyTwist) -> bool:
+    """Return whether all three numbers of a velocity are finite."""
+    return math.isfinite(twist.vx) and math.isfinite(twist.vy) and math.isfinite(twist.omega)
+
+
 def apply(
     limits: EnvelopeLimits, state: EnvelopeState, wanted: BodyTwist, mode: Mode
 ) -> tuple[EnvelopeState, BodyTwist]:

@@ -15,7 +15,7 @@ import msgspec
 
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
-from safety.envelope import EnvelopeLimits, contact_speed, reduces, too_fast
+from safety.envelope import EnvelopeLimits, contact_speed, is_number, reduces, too_fast
 from safety.motion_bounds import TravelLimits
 from safety.travel import Travel
 
@@ -56,6 +56,7 @@ class Latch(IntEnum):
     MOVING_TIME = 15
     CONTACT_SPEED = 16
     SUSPENDED = 17
+    ODOMETRY = 18
 
 
 LATCH_TEXT = {
@@ -70,6 +71,7 @@ LATCH_TEXT = {
     Latch.STEP: "control's velocity jumped",
     Latch.FROZEN_TICK: "control's tick counter has stopped",
     Latch.OVERSPEED: "the base is faster than the envelope",
+    Latch.ODOMETRY: "the base's odometry is not a number",
     Latch.LINK: "the base link is gone",
     Latch.EOF_MOVING: "control died while the base was moving",
     Latch.PAUSED: "the gate itself was frozen for more than 100 ms",
@@ -84,6 +86,7 @@ LATCH_FAULT = {
     Latch.SILENCE: "F66",
     Latch.STALE: "F66",
     Latch.OVERSPEED: "F35",
+    Latch.ODOMETRY: "F49",
     Latch.LINK: "F30",
     Latch.PAUSED: "F67",
     Latch.TRAVEL: "F47",
@@ -145,10 +148,12 @@ def on_clock(state: GateState, now_ns: int) -> GateState:
 
 
 def on_speed(limits: EnvelopeLimits, state: GateState, twist: BodyTwist) -> GateState:
-    """Count measured speeds (odometry, BODY frame) beyond the envelope; three in a row latch."""
+    """Count measured speeds (odometry, BODY frame) beyond the envelope or no numbers; three in a row latch."""
     count = state.overspeed + 1 if too_fast(limits, twist) else 0
     state = msgspec.structs.replace(state, overspeed=count)
-    return latched(state, Latch.OVERSPEED) if count >= OVERSPEED_SAMPLES and not state.latch else state
+    if count < OVERSPEED_SAMPLES or state.latch:
+        return state
+    return latched(state, Latch.OVERSPEED if is_number(twist) else Latch.ODOMETRY)
 
 
 def on_travel(limits: TravelLimits, state: GateState, travel: Travel) -> GateState:
@@ -195,7 +200,7 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
     if state.said_ns and frame.sent_ns - state.said_ns > FRAME_MAX_AGE_NS:
         return Latch.SILENCE
     twist = frame.twist
-    if not (math.isfinite(twist.vx) and math.isfinite(twist.vy) and math.isfinite(twist.omega)):
+    if not is_number(twist):
         return Latch.NOT_FINITE
     if math.hypot(twist.vx, twist.vy) > limits.speed * (1.0 + 1e-9) or abs(twist.omega) > limits.turn_rate * (
         1.0 + 1e-9

@@ -37,6 +37,11 @@ COMMANDS = {
         "one push, on hardware, emulated or simulated",
         ("push run emulated --distance-m 2", "push run sim --fast --seed 3 --json"),
     ),
+    "stop": Command(
+        "tools.commands.stop",
+        "stop the runs under way, or a rig's base by zeros",
+        ("push stop", "push stop emulated --json"),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",
@@ -116,6 +121,9 @@ def main(argv: Sequence[str]) -> int:
             where = str(error.filename or "")  # empty: the disk that stdout goes to
             with ignoring_output_errors():
                 return report(EnvironmentFault("there is no space left on the disk", where=where), as_json=as_json)
+        if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+            few = EnvironmentFault("too many open files", do="Allow more: ulimit -n 1024")
+            return report(few, as_json=as_json)
         return report(unexpected(error), as_json=as_json)
     return code
 

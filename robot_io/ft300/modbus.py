@@ -66,6 +66,7 @@ class Ft300Registers:
                 where=self._where,
                 do=f"{POWER_CYCLE}; a Robotiq gripper on this port would stay silent, too",
             )
+        self._refuse_echo()
         raise DeviceProtocolError(
             f"it answers, but not as an FT 300 ({failure})", where=self._where, do="Check which device is on this port"
         )
@@ -92,6 +93,7 @@ class Ft300Registers:
 
     def _stop_stream(self, limit_s: float) -> None:
         if not self._line.make_quiet(limit_s):
+            self._refuse_echo()
             raise DeviceProtocolError(
                 "it keeps sending and does not stop on request",
                 where=self._where,
@@ -100,6 +102,15 @@ class Ft300Registers:
         self._line.wait_sent()
         time.sleep(MODE_CHANGE_S)
         self._line.flush_input()
+
+    def _refuse_echo(self) -> None:
+        """Raise DeviceProtocolError when the adapter sends back what we send: a sensor cannot be heard through that."""
+        if self._line.echoes():
+            raise DeviceProtocolError(
+                "the adapter's echo: what is sent comes back",
+                where=self._where,
+                do="Turn off the echo of the RS-485 adapter (its receiver must be off while it sends)",
+            )
 
     def _info(self, firmware: list[int]) -> DeviceInfo:
         version = firmware_text(firmware)

@@ -158,6 +158,17 @@ class SerialLine:
                 time.sleep(0.001)  # a stream that is always readable must not spin
         return False
 
+    def echoes(self) -> bool:
+        """Send 0xFF, which asks a sensor for nothing but silence; return whether it comes back within 100 ms."""
+        self.flush_input()
+        self.serial.write(BURST)
+        heard = b""
+        deadline_s = time.monotonic() + SILENCE_S
+        while BURST not in heard and time.monotonic() < deadline_s:
+            self.wait_readable(POLL_MS)
+            heard += self.read_now()
+        return BURST in heard
+
     def wait_sent(self, limit_s: float = 0.5) -> None:
         """Wait until the kernel has sent everything (as tcdrain, but bounded; a socket cannot tell)."""
         deadline_s = time.monotonic() + limit_s

@@ -15,6 +15,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from robot_io.errors import EnvironmentFault
+
 _PR_SET_PDEATHSIG = 1
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
@@ -99,6 +101,19 @@ def leave_realtime() -> None:
     """Go back to normal scheduling; nothing happens where `try_realtime` was refused."""
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
+
+
+def allow_descriptors(count: int) -> None:
+    """Allow this process and its children `count` open files at least. Raises EnvironmentFault where that is denied."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft >= count or soft == resource.RLIM_INFINITY:
+        return
+    if count > hard != resource.RLIM_INFINITY:
+        raise EnvironmentFault(
+            f"a process may have only {hard} files open here, and {count} are needed",
+            do=f"Allow more: ulimit -n {count}",
+        )
+    resource.setrlimit(resource.RLIMIT_NOFILE, (count, hard))
 
 
 def forbid_new_descriptors() -> None:

@@ -15,7 +15,7 @@ from typing import Any, Literal, Self
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
 from robot_io.driver import DriverBase, no_more_options
-from robot_io.errors import ConfigError, DeviceNotReady, DeviceUnreachable
+from robot_io.errors import ConfigError, DeviceUnreachable
 from robot_io.messages import (
     BaseFeed,
     BodyTwist,
@@ -155,11 +155,7 @@ class Ridgeback(DriverBase):
             if link is None:
                 raise DeviceUnreachable(self._cause or "not open", where=self.url, do="Open the driver again")
             if not link.wait_readable(until_ns):
-                raise DeviceNotReady(
-                    f"no message on {', '.join(silent)} within {FIRST_MESSAGE_TIMEOUT_S:g} s",
-                    where=self.url,
-                    do="Check that its publisher runs (motion capture: is the base seen?) and its name in the rig file",
-                )
+                raise self._intake.refused.explain(silent, self.url, FIRST_MESSAGE_TIMEOUT_S)
             self._receive()
         self._started = True
         if self._link is not None:

@@ -8,6 +8,7 @@ from collections import deque
 from robot_io.clock import ClockNs
 from robot_io.messages import BaseFeed, Stamped
 from robot_io.ridgeback.feeds import FeedReader
+from robot_io.ridgeback.refused import RefusedMessages
 from robot_io.ridgeback.rosbridge_codec import Published, decode_frame
 from robot_io.ridgeback.websocket_link import MOST_FRAMES, READ_NS, WebSocketLink
 
@@ -26,6 +27,7 @@ class Intake:
         self._undecoded.clear()
         self._reader.reset()
         self.counters = {"messages": 0, "undecodable": 0}
+        self.refused = RefusedMessages()
         self.newest_inbound_ns = 0
         """When the newest message of any topic arrived; 0 before the first."""
         self.behind_since_ns = 0
@@ -58,6 +60,7 @@ class Intake:
                 return []
             self.newest_inbound_ns = received_ns
             return self._reader.read(frame, received_ns)
-        except ValueError:
+        except ValueError as error:
             self.counters["undecodable"] += 1
+            self.refused.note(text, error)
             return []

@@ -208,6 +208,15 @@ def test_measured_overspeed_latches_after_three_in_a_row():
     assert state.twist == ZERO
 
 
+@pytest.mark.parametrize("twist", [BodyTwist(math.nan), BodyTwist(0.0, math.nan), BodyTwist(0.1, 0.0, math.nan)])
+def test_a_measured_speed_that_is_no_number_has_a_latch_of_its_own(twist):
+    state = ROLLING
+    for latch in (0, 0, Latch.ODOMETRY):
+        state = gate.on_speed(LIMITS, state, twist)
+        assert state.latch == latch
+    assert gate.LATCH_FAULT[Latch.ODOMETRY] == "F49"
+
+
 @pytest.mark.parametrize(
     "twist", [BodyTwist(0.1, 0.17, 0.0), BodyTwist(0.0, 0.0, 0.326), BodyTwist(0, 0, -0.326), BodyTwist(math.nan)]
 )
@@ -238,7 +247,7 @@ def test_the_first_cause_stays_for_ever_and_nothing_but_zero_is_left():
 
 
 def test_every_latch_has_a_text_and_names_a_row_of_the_fault_table():
-    assert [int(latch) for latch in Latch] == list(range(18))  # each its own, for ever: the numbers are in logs
+    assert [int(latch) for latch in Latch] == list(range(19))  # each its own, for ever: the numbers are in logs
     assert set(LATCH_TEXT) == set(Latch)
     assert set(LATCH_FAULT) <= set(Latch)
     assert set(LATCH_FAULT.values()) <= set(FAULTS)

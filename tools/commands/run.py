@@ -8,6 +8,7 @@ from typing import Any
 
 from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
+from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools.kinds import device_names
@@ -24,9 +25,12 @@ from tools.run.run_state import status_line
 from tools.terminal import verdict
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
 
+MOST_DESCRIPTORS = 128
+"""Files and sockets that any process of a run has open at the same time, with room to spare."""
 MAX_SEED = 2**63 - 1
 """The largest integer that the log can hold."""
 
@@ -190,6 +194,8 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
     try:
         from tools.run.launcher import Launcher
 
+        allow_descriptors(MOST_DESCRIPTORS)
+
         launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
         with awake():
             figures = launcher.run()
@@ -206,7 +212,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         seed=args.seed,
         level=level_of(rig),
         devices=launcher.devices(figures),
-        notes=launcher.notes,
+        notes=[*arm_pose_notes(rig, figures), *launcher.notes],
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
@@ -257,7 +263,7 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         seed=args.seed,
         level="sim",
         devices=figures["devices"],
-        notes=[],
+        notes=arm_pose_notes(rig, figures),
         witness=Witness(),
         pushed=object_pose(rig.path, log.object_poses),
     )

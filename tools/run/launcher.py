@@ -6,8 +6,7 @@
     arm         the ur_rtde library, publishing a shared record
     control     the loop: sensor, law, supervisor, envelope, one frame to the gate per tick
 
-How they are connected: `processes`. The launcher itself has no device and no real-time work: a blocked terminal
-never delays a tick.
+How they are connected: `processes`. The launcher itself has no device and no real-time work.
 """
 
 from __future__ import annotations
@@ -30,6 +29,7 @@ from safety.gate import Latch
 from tools.kinds import name_of
 from tools.places import run_dir
 from tools.places.atomic_file import write_json
+from tools.places.running import announce, forget
 from tools.places.saved_tare import SavedTare
 from tools.run.figures_from_log import figures_from_log
 from tools.run.processes import Processes
@@ -75,11 +75,9 @@ class Launcher:
             rig, seed=seed, saved=saved, log=self.log, kind_folder=kind_folder, on_spawn=self._listen
         )
         self._children = self._processes.children
-        self._began = False
-        self._stop_asked_ns = 0
-        self._killed_by_operator = False
+        self._began = self._ending = self._killed_by_operator = False
+        self._stop_asked_ns = self._status_ns = 0
         self._gate_latch = ""
-        self._status_ns = 0
 
     def run(self) -> dict[str, Any]:
         """Run to the end; return the figures. Raises PushError if the run did not start or its result is unknown."""
@@ -97,12 +95,13 @@ class Launcher:
             return self._figures()
         finally:
             self._live.close()
+            forget()
             for child in self._children.values():
                 child.close()
 
     @property
     def began(self) -> bool:
-        """Return whether every device was ready and the loop was started."""
+        """Return whether the loop was started."""
         return self._began
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
@@ -141,10 +140,13 @@ class Launcher:
     def _start(self) -> None:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)
         names = self._processes.start_remaining(run_dir.write_config(self._out, self._rig))
-        pids = {"schema": 1, "launcher": os.getpid(), **self._processes.pids}
-        write_json(self._out / "processes.json", pids)
+        pids = {"launcher": os.getpid(), **self._processes.pids}
+        write_json(self._out / "processes.json", {"schema": 1, **pids})
+        announce(self._rig, pids)
         self._wait_ready(names, READY_NS)
         self._warn_without_realtime()
+        if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full
+            raise errors[0]
         self._began = True
         self._processes.send_to_control(b"G")
 
@@ -168,9 +170,12 @@ class Launcher:
                 self._live.say(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
                 self._live.say(f"recorder: {event['error']['what']}")
-                self._processes.send_to_control(b"L")
+                if self._began:
+                    self._processes.send_to_control(b"L")
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
+            if child.name == "emulators" and not self._ending:
+                self._live.say("the emulators have ended: every emulated device is gone")
 
     def _wait_ready(self, names: list[str], within_ns: int) -> None:
         """Wait until all are ready. Raises PushError naming everything that failed and what to do about each."""
@@ -217,15 +222,12 @@ class Launcher:
 
     def _stop(self) -> None:
         now_ns = monotonic_ns()
+        late = now_ns - self._stop_asked_ns > SECOND_STOP_NS
         if not self._stop_asked_ns:
             self._stop_asked_ns = now_ns
             self._live.say("stopping ...")
             self._processes.send_to_control(b"S")
-        elif (
-            now_ns - self._stop_asked_ns > SECOND_STOP_NS
-            and "control" in self._children
-            and not self._killed_by_operator
-        ):
+        elif late and "control" in self._children and not self._killed_by_operator:
             self._killed_by_operator = True
             self._live.say("stopping at once")
             self._children["control"].process.kill()
@@ -238,6 +240,7 @@ class Launcher:
 
     def _end(self) -> None:
         """End all: the gate by control's EOF, the recorder by that of all producers, the others by SIGTERM."""
+        self._ending = True
         self._processes.hang_up()
         control = self._children.get("control")
         if control is not None and control.ready is None:
