@@ -22,7 +22,7 @@ import pytest
 from tests.host_watch import REPEATS, UNMEASURED, HostStalled, HostWatch
 from tests.push_runs import QUICK, Ended, Run, stands, started, world_of
 
-PUSHING = r"PUSH +(?!0\.00/)[0-9.]+/.* v 0\.10 m/s"
+PUSHING = r"PUSH +(?!0\.00/)[0-9.]+/.* v {speed:.2f} m/s"
 STALL_MS = 10.0
 
 
@@ -41,23 +41,37 @@ class Round(NamedTuple):
 
 
 @contextlib.contextmanager
-def pushing(state: Path, folder: Path, host: HostWatch, **popen: Any) -> Iterator[tuple[Run, dict[str, int]]]:
-    """Give a run in the middle of its push at 0.1 m/s, and its processes by name."""
-    argv = ("run", "emulated", "--distance-m", "5", *QUICK, "--out", str(folder), "--json")
+def pushing(
+    state: Path, folder: Path, host: HostWatch, *, speed: float = 0.1, **popen: Any
+) -> Iterator[tuple[Run, dict[str, int]]]:
+    """Give a run in the middle of its push at `speed` (m/s), and its processes by name."""
+    fast = ("--set", f"control.push_speed_m_per_s={speed}")
+    argv = ("run", "emulated", "--distance-m", "5", *QUICK, *fast, "--out", str(folder), "--json")
     with started(state, *argv, host=host, **popen) as run:
-        run.wait_for(PUSHING)
+        run.wait_for(PUSHING.format(speed=speed))
         yield run, json.loads((folder / "processes.json").read_text())
 
 
 def strike(
-    state: Path, folder: Path, name: str, number: signal.Signals, host: HostWatch, *, log: str = "run.mcap"
+    state: Path,
+    folder: Path,
+    name: str,
+    number: signal.Signals,
+    host: HostWatch,
+    *,
+    log: str = "run.mcap",
+    speed: float = 0.1,
 ) -> Round:
-    """Send a signal to one process of a pushing run, wait for the end of everything, and read its log."""
-    with pushing(state, folder, host) as (run, pids):
+    """Send a signal to one process of a pushing run, wait for the end of everything, and read its log.
+
+    name: of the process, or of several with a space between.
+    """
+    with pushing(state, folder, host, speed=speed) as (run, pids):
         watched = {pids[who] for who in ("gate", "emulators", *([name] if name == "launcher" else []))}
         before = _waited_ms(watched)
         at_ns = time.monotonic_ns()
-        os.kill(pids[name], number)
+        for one in name.split():
+            os.kill(pids[one], number)
         time.sleep(0.12)
         waited = [after - before[pid] for pid, after in _waited_ms(watched).items()]
         stall_ms = max([host.worst_ms(at_ns, time.monotonic_ns()), *waited])

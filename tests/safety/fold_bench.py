@@ -111,7 +111,8 @@ class FoldBench:
 
     def at_full_speed(self) -> FoldBench:
         """Fold good inputs until the push has its full speed."""
-        self.run_until(lambda b: b.state.control.phase == Phase.PUSH and b.state.control.speed >= 0.1)
+        full = self.rig.control.push_speed_m_per_s
+        self.run_until(lambda b: b.state.control.phase == Phase.PUSH and b.state.control.speed >= full)
         for _ in range(5):
             self.fold()
         assert self.output.faults == ()
