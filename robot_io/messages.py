@@ -132,6 +132,8 @@ class DeviceInfo(msgspec.Struct, frozen=True, gc=False):
     version: str = ""
     """Of its firmware or software."""
     serial: str = ""
+    remarks: tuple[str, ...] = ()
+    """What was noticed while it was opened and the operator should know, in words."""
 
 
 class DeviceHealth(msgspec.Struct, frozen=True, gc=False):
@@ -181,6 +183,8 @@ class CommandEcho(msgspec.Struct, frozen=True, gc=False, tag=True):
     """A velocity heard on the base's own command topic, ours or another's: proof that commands get there."""
 
     twist: BodyTwist
+    ours: bool = True
+    """Whether this driver has sent it."""
 
 
 BaseFeed = BasePose | BaseOdometry | BaseReport | SliderPose | CommandEcho
