@@ -67,6 +67,8 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "log_dropped": inp.host.log_dropped,
         "contact_seen": control.contact_seen,
         "residual_N": control.residual_N if math.isfinite(control.residual_N) else None,
+        "early_contact": control.early_contact,
+        "force_before_contact_N": force_N if math.isfinite(force_N := control.force_before_contact_N) else None,
         "bias_force_N": list(control.bias_force),
         "bias_torque_Nm": list(control.bias_torque),
         "tared": control.tared,

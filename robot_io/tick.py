@@ -119,6 +119,10 @@ class HostInput(msgspec.Struct, frozen=True, gc=False):
     recorder_alive: bool
     loop_error: bool
     log_dropped: int
+    launcher_silent_ns: int = 0
+    """How long the launcher, which has the operator's keys, has given no sign of life."""
+    recorder_silent_ns: int = 0
+    """How long the recorder has taken nothing of what waited for it."""
     asleep_ns: int = 0
     """CLOCK_BOOTTIME minus CLOCK_MONOTONIC: grows only while this machine is suspended (0 at level sim)."""
 

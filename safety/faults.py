@@ -407,11 +407,11 @@ FAULTS: dict[str, Fault] = dict(
         ),
         _row(
             "F63",
-            "the recorder is gone",
+            "the log is not complete: its recorder is gone or frozen, or the disk too slow",
             Mode.HOLD,
             _L,
             100,
-            measured="time without a recorder",
+            measured="time without recording",
             limit=1000.0,
             unit="ms",
         ),
@@ -431,6 +431,26 @@ FAULTS: dict[str, Fault] = dict(
         ),
         _row("F68", "an exception in the loop", Mode.STOP, _L, 0, 1),
         _row("F69", "the arm's process is gone", Mode.STOP, _L, 1),
+        _row(
+            "F73-hold",
+            "the launcher, which has the operator's keys, was silent for 0.5 s",
+            Mode.HOLD,
+            _A,
+            50,
+            measured="time since the launcher's last sign of life",
+            limit=500.0,
+            unit="ms",
+        ),
+        _row(
+            "F73-stop",
+            "the launcher, which has the operator's keys, was silent for 2 s",
+            Mode.STOP,
+            _L,
+            200,
+            measured="time since the launcher's last sign of life",
+            limit=2000.0,
+            unit="ms",
+        ),
     )
 )
 

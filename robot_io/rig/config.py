@@ -213,9 +213,9 @@ class RigConfig(Table, frozen=True):
     path: PathConfig = PathConfig()
     sliders: SlidersConfig = SlidersConfig()
     control: ControlConfig = ControlConfig()
-    goal: GoalConfig = GoalConfig()
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
+    goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()
 

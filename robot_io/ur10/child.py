@@ -23,6 +23,7 @@ from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable, Push
 from robot_io.ipc.process import (
     die_with_parent,
     forbid_new_descriptors,
+    is_hung_up,
     lock_memory,
     set_timer_slack_1ns,
     starting_threads_at,
@@ -83,10 +84,13 @@ class ArmProcess:
         self._publish(monotonic_ns(), LinkState.UP, reader.error)
 
     def run(self) -> None:
-        """Publish until SIGTERM; then end cleanly. Raises DeviceError when the link or the holding is lost."""
+        """Publish until SIGTERM or the end of the run; then end cleanly.
+
+        Raises DeviceError when the link or the holding is lost.
+        """
         deadline_ns = monotonic_ns()
         command_ns = deadline_ns
-        while not self._ending.asked:
+        while not (self._ending.asked or is_hung_up(self._job.run_fd)):
             now_ns = monotonic_ns()
             fresh = self._reader.poll(now_ns)
             error = self._reader.error

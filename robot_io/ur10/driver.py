@@ -38,7 +38,8 @@ STOP_WITHIN_S = 3.0
 
 def spawn_arm(job: ArmJob) -> Child:
     """Start the arm's process; it is ready within START_WITHIN_S, dies with the calling thread, ends on SIGTERM."""
-    return spawn("arm", "robot_io.ur10.child", job, [job.record_fd])
+    fds = [job.record_fd] if job.run_fd < 0 else [job.record_fd, job.run_fd]
+    return spawn("arm", "robot_io.ur10.child", job, fds)
 
 
 class ArmLink:

@@ -107,6 +107,7 @@ def test_what_the_base_says_is_in_the_record():
             heard(CommandEcho(SLOW), 4),
             heard(BasePose(Pose2D(1.1, 2.0, 0.5), "no unit quaternion"), 5),
             heard(BaseReport(BaseStatus(False, True, 26.5)), 6),
+            heard(SliderPose(Pose2D(8.0, 8.0, 0.0), "no unit quaternion"), 7),
         ]
     )
     assert shell.record == replace(

@@ -18,6 +18,7 @@ from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
 from tools.run.awake import awake
+from tools.run.bounds import bounds_lines, bounds_of, check_room
 from tools.run.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
@@ -54,6 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--dry-run", action="store_true", help="show what would run, without connecting to anything")
     parser.add_argument("--move-robot", action="store_true", help="needed before any real device is opened")
+    parser.add_argument(
+        "--drive-blind", action="store_true", help="let a real base move although its sensor or arm is emulated"
+    )
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
@@ -70,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
     simulated = bool(devices_at(rig, "sim"))
     if not simulated:
         print_levels(rig)
+    print_bounds(rig)
     with DeviceLocks(rig):
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
@@ -79,7 +84,9 @@ def run(args: argparse.Namespace) -> int:
             if early is not None:
                 early.drop()
             raise
-    summary["report"] = None
+    summary |= {"bounds": bounds_of(rig), "report": None}
+    if blind := blind_words(rig):
+        summary["notes"].insert(0, blind)
     write_summary(summary, out)
     if not args.no_report:
         write_report(summary, out, early)
@@ -120,10 +127,14 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
             where="push run",
             do="Clear the floor, hold the e-stop, and add --move-robot",
         )
+    blind = blind_words(rig)
+    if blind and not args.drive_blind:
+        raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
     if not 0 <= args.seed <= MAX_SEED:
         raise UsageError(f"--seed {args.seed} is out of range", where="push run", do=f"Give 0 to {MAX_SEED}")
+    check_room(rig, args.seed)
 
 
 def print_levels(rig: RigConfig) -> None:
@@ -131,6 +142,21 @@ def print_levels(rig: RigConfig) -> None:
     for device, level in (("ft", rig.ft.level), ("arm", rig.arm.level), ("base", rig.base.level)):
         where = {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}[device]
         tell(f"{device:<5} {level:<9} {where if level == 'hardware' else ''}".rstrip())
+
+
+def blind_words(rig: RigConfig) -> str:
+    """Return in words what a real base does not feel, "" where all its devices are real or it is not real itself."""
+    emulated = devices_at(rig, "emulated")
+    if rig.base.level != "hardware" or not emulated:
+        return ""
+    verb = "is" if len(emulated) == 1 else "are"
+    return f"the real base moves blind: {' and '.join(emulated)} of its rig {verb} only emulated"
+
+
+def print_bounds(rig: RigConfig) -> None:
+    """Print what bounds the motion of a run."""
+    for line in (*bounds_lines(rig), *filter(None, [blind_words(rig)])):
+        tell(line)
 
 
 def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
@@ -148,8 +174,10 @@ def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
         "distance_m": rig.control.distance_m,
         "controller": rig.control.controller,
         "push_speed_m_per_s": rig.control.push_speed_m_per_s,
+        "bounds": bounds_of(rig),
     }
     print_levels(rig)
+    print_bounds(rig)
     tell(f"would push {rig.control.distance_m:g} m at {rig.control.push_speed_m_per_s:g} m/s; nothing was opened")
     if args.json:
         say_json(facts)
@@ -190,7 +218,7 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
     from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
     text = run_dir.write_config(out, rig)
-    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, faults=rig.faults.inject)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved)
     except PushError:  # an impossible world: nothing has started
@@ -219,6 +247,7 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
             f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Free some space"
         ) from None
     live.end()
+    live.close()
     save_tare(rig, figures)
     summary = verdict.summary(
         rig,

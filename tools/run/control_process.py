@@ -9,6 +9,7 @@ import select
 import signal
 import socket
 import sys
+import time
 
 import msgspec
 
@@ -16,7 +17,7 @@ from control.loop import ControlLoop, Watch
 from control.run_notes import outcome
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.driver import Sensor
-from robot_io.errors import PushError
+from robot_io.errors import EnvironmentFault, PushError
 from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
@@ -34,8 +35,10 @@ from tools.run.run_state import initial_state, status_line
 from tools.run.tick_core import TickCore
 
 PRIORITY = 80
-VERDICT_WITHIN_S = 60.0
-"""How long a blocked launcher (a stopped terminal) may take to read the result; the base is already at rest."""
+VERDICT_WITHIN_S = 3.0
+"""How long a launcher on a busy machine may take to read the result; the base is already at rest."""
+LAUNCHER_SILENT_S = 2.0
+"""A launcher that was silent for this long before the start is frozen, and nobody holds the operator's keys."""
 
 
 class DriverWarnings(logging.Handler):
@@ -96,7 +99,7 @@ def main() -> int:
         sensor.close()
         raise
     status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
-    if not _wait_for_go(job.operator_fd, sensor):
+    if not _wait_for_go(job.operator_fd, sensor, status):
         base.close()
         sensor.stop()
         sensor.close()
@@ -112,14 +115,21 @@ def main() -> int:
     return _finish(loop, sensor, status, rig.loop.rate_hz, injection.counts("ft", "arm"))
 
 
-def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
+def _wait_for_go(operator_fd: int, sensor: Sensor, status: StatusPipe) -> bool:
     """Return whether the launcher lets the loop start; keep the sensor drained while waiting."""
     os.set_blocking(operator_fd, False)
-    while True:
+    heard_s = time.monotonic()
+    while time.monotonic() - heard_s < LAUNCHER_SILENT_S:
         readable, _, _ = select.select([operator_fd], [], [], 0.05)
         sensor.drain()
         if readable:
-            return os.read(operator_fd, 1) == b"G"
+            heard_s = time.monotonic()
+            key = os.read(operator_fd, 1)
+            if key != b"H":
+                return key == b"G"
+    frozen = f"the launcher was frozen for {LAUNCHER_SILENT_S:g} s before the start; nothing has moved"
+    status.error(EnvironmentFault(frozen, do="Start again"))
+    return False
 
 
 def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float, injected: dict[str, int]) -> int:

@@ -35,6 +35,8 @@ class ArmKindJob(msgspec.Struct, frozen=True):
     kind_folder: str
     launcher_pid: int
     record_fd: int
+    run_fd: int
+    """EOF on it means that control has ended."""
     status_fd: int
 
 
@@ -48,4 +50,6 @@ class EmulatorJob(msgspec.Struct, frozen=True):
     """The emulated devices: any of ft, arm and base."""
     launcher_pid: int
     ring_fd: int
+    run_fd: int
+    """EOF on it means that control has ended."""
     status_fd: int

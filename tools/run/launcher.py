@@ -51,6 +51,8 @@ FROZEN_NS = NS_PER_S
 """If the gate has latched and control has sent no status for this long, it is frozen and is killed."""
 FIRST_STATUS_NS = 5 * NS_PER_S
 """If control has sent no status this long after its start, it froze before the gate could detect it."""
+BEAT_NS = NS_PER_S // 10
+"""How often control is told that the launcher lives: silent for 0.5 s, the base holds, for 2 s, it stops (F73)."""
 SECOND_STOP_NS = NS_PER_S
 """A second stop counts only this long after the first: `timeout` and shells may send one stop twice."""
 ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0}
@@ -82,6 +84,7 @@ class Launcher:
     def run(self) -> dict[str, Any]:
         """Run to the end; return the figures. Raises PushError if the run did not start or its result is unknown."""
         keys = OperatorKeys(self._loop, self._stop, self._resume)
+        self._loop.call_every(BEAT_NS, lambda _: self._processes.send_to_control(b"H"))
         try:
             try:
                 self._start()
@@ -93,6 +96,7 @@ class Launcher:
             self._note_process_failures()
             return self._figures()
         finally:
+            self._live.close()
             for child in self._children.values():
                 child.close()
 
@@ -229,7 +233,7 @@ class Launcher:
             self._children["control"].process.kill()
 
     def _resume(self) -> None:
-        if self._began:  # before the start, any byte but G would end control
+        if self._began:  # before the start, any byte but G and H would end control
             self._processes.send_to_control(b"R")
 
     # --- end -------------------------------------------------------------------------------------------------
@@ -278,6 +282,8 @@ class Launcher:
             if figures["error"]:
                 self.notes.append(f"{figures['error']}; this is a bug, its traceback is in {control.save_stderr()}")
             return figures
+        if control.errors:
+            raise control.errors[-1]
         if self._killed_by_operator:
             code, how = OperatorStop.exit_code, "was killed by the operator"
         elif control.process.returncode < 0:

@@ -19,8 +19,9 @@ from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
 from robot_io.messages import ArmRecord
-from robot_io.rig.config import RigConfig
+from robot_io.rig.config import RigConfig, rig_from_toml
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.fault_words import FaultWord
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety.gate_shell import GateShell
 from safety.motion_bounds import total_bounds
@@ -82,8 +83,9 @@ class Lockstep:
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
         )
-        write = event_writer(push, SIM_EPOCH_NS - START_NS)
-        self.injection = Injection(rig.faults.inject, self._clock, write)
+        self._note_injected = event_writer(push, SIM_EPOCH_NS - START_NS)
+        self.first_injected_ns: int | None = None
+        self.injection = Injection(rig.faults.inject, self._clock, self._on_injected)
         self.injection.begin(START_NS)
         self._ft_edge = InjectedSensor(self._ft, self.injection, rig)
         self._arm_edge = InjectedArm(self._arm, self.injection)
@@ -158,7 +160,12 @@ class Lockstep:
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
         """Pass the command through the gate, as the gate process does."""
         frame = GateFrame(self._gate.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
-        self._gate = self._gate.on_frames((frame,), now_ns, now_ns).on_clock(now_ns, self._base_edge.health())
+        self._gate = self._gate.on_frames((frame,), now_ns, now_ns)
+        self._turn_gate(now_ns)
+
+    def _turn_gate(self, now_ns: int) -> None:
+        """Let the gate judge and send what is due."""
+        self._gate = self._gate.on_clock(now_ns, self._base_edge.health())
         self._gate, latching = self._gate.on_leaving(now_ns)
         if latching is not None:
             self._gate_log.latched(now_ns, *astuple(latching))
@@ -172,6 +179,11 @@ class Lockstep:
             self._gate = self._gate.on_sent(wanted, really, now_ns)
             self._gate_log.sent(now_ns, really)
 
+    def _on_injected(self, word: FaultWord, now_ns: int) -> None:
+        if self.first_injected_ns is None:
+            self.first_injected_ns = now_ns
+        self._note_injected(word, now_ns)
+
     def _take_base(self, now_ns: int) -> None:
         samples = self._base_edge.drain()
         for sample in samples:
@@ -182,9 +194,9 @@ class Lockstep:
         )
 
 
-def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool, faults: tuple[str, ...] = ()) -> RunLog:
+def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
     """Open the log of a lockstep run; its facts hold nothing that differs from run to run."""
-    facts = run_facts("sim", seed, in_contact=in_contact, faults=faults)
+    facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact)
     return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
 
 

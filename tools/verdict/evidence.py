@@ -14,6 +14,8 @@ MOST_LOST_SHARE = 0.1
 """More of the push without contact than this, and it was not the object that was pushed all the way ..."""
 MOST_LOSSES = 5
 """... nor if contact was lost more often than this."""
+MOST_FORCE_BEFORE_N = 3.0
+"""A mean force above this just before first contact, where it should be 0, is no sensor to measure a contact with."""
 LINE = ("corridor", "end")
 """The items that say where the push went; all others say whether it can be believed."""
 LAUNCHER = "F73"
@@ -38,6 +40,7 @@ def gather(rig: RigConfig, figures: dict[str, Any], witness: Witness) -> list[Tr
     items = [
         *_line(rig, figures),
         *_contact(figures),
+        *_first_contact(figures),
         _residual(figures["residual_N"]),
         _log(witness.log),
         _missing(max(witness.records_missing, figures["log_dropped"])),
@@ -109,6 +112,19 @@ def _contact(figures: dict[str, Any]) -> list[TrustItem]:
             times,
             MOST_LOSSES,
         ),
+    ]
+
+
+def _first_contact(figures: dict[str, Any]) -> list[TrustItem]:
+    force_N = figures["force_before_contact_N"]
+    if force_N is None:
+        return []
+    early = figures["early_contact"]
+    when = "long before the object was expected" if early else "about where the object was expected"
+    said = f"the mean force just before first contact was {force_N:.2f} N, limit {MOST_FORCE_BEFORE_N:g} N"
+    return [
+        _item("early_contact", "against" if early else "for", f"first contact came {when}"),
+        _item("force_before_contact", _within(force_N, MOST_FORCE_BEFORE_N), said, force_N, MOST_FORCE_BEFORE_N, "N"),
     ]
 
 

@@ -11,6 +11,7 @@ from tools.verdict.evidence import LINE, TrustItem
 DONE, OFF_THE_LINE, NOT_TRUSTED, CONTACT_LOST = "done", "off the line", "not trusted", "contact lost"
 FAILURES = {
     1: "error",
+    2: "refused",
     4: "not ready",
     5: "safety stop",
     6: CONTACT_LOST,

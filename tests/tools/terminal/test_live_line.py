@@ -137,6 +137,30 @@ def test_a_stopped_terminal_holds_nobody_up():
     os.close(ours)
 
 
+def test_a_line_longer_than_the_room_left_holds_nobody_up():
+    """A poll says that there is room for a byte; the line may need more."""
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "w") as stderr, contextlib.redirect_stderr(stderr):
+        live = LiveLine(load_rig("emulated"))
+        began_s = time.monotonic()
+        for _ in range(20):
+            live.say("x" * 3000)  # nobody reads
+        assert time.monotonic() - began_s < 2.0
+        live.close()
+        live.close()
+        termios.tcflush(theirs, termios.TCOFLUSH)
+    os.close(ours)
+
+
+def test_a_file_is_written_at_its_end(tmp_path):
+    with (tmp_path / "err").open("w") as stderr, contextlib.redirect_stderr(stderr):
+        print("before", file=stderr, flush=True)
+        live = LiveLine(load_rig("emulated"))
+        live.say("between")
+        print("after", file=stderr, flush=True)
+    assert (tmp_path / "err").read_text() == "before\nbetween\nafter\n"
+
+
 def test_a_closed_terminal_and_none_at_all():
     ours, theirs = pty.openpty()
     stderr = os.fdopen(theirs, "w")

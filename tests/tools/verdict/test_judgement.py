@@ -15,6 +15,8 @@ GOOD = {
     "lateral_error_m": 0.02,
     "lost_m": 0.0,
     "lost_times": 0,
+    "early_contact": False,
+    "force_before_contact_N": 0.3,
     "residual_N": 0.4,
     "log_dropped": 0,
     "fault_counts": {},
@@ -33,7 +35,8 @@ def test_a_good_push_is_done_and_every_question_was_asked():
     trust = gather(load_rig("emulated"), GOOD, Witness(unanswered=0))
     assert judge(0, trust) == ("done", 0)
     assert [item.id for item in trust] == [
-        "corridor", "end", "contact_lost_m", "contact_lost_times", "residual", "log", "log_dropped", "preflight"
+        "corridor", "end", "contact_lost_m", "contact_lost_times", "early_contact", "force_before_contact",
+        "residual", "log", "log_dropped", "preflight"
     ]  # fmt: skip
     assert {item.says for item in trust} == {"for"}
 
@@ -75,6 +78,10 @@ def test_a_push_that_starts_further_off_may_end_as_far_off():
         ({"lost_m": 0.201}, "contact_lost_m"),
         ({"lost_times": 5}, None),
         ({"lost_times": 6}, "contact_lost_times"),
+        ({"early_contact": True}, "early_contact"),
+        ({"force_before_contact_N": 3.0}, None),
+        ({"force_before_contact_N": 3.01}, "force_before_contact"),
+        ({"force_before_contact_N": None}, None),
         ({"log_dropped": 1}, "log_dropped"),
         ({"fault_counts": {"F73-hold": 1}}, "launcher"),
     ],
