@@ -279,6 +279,8 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     object_pose: Pose2D = Pose2D(_NAN, _NAN, _NAN)
     """The newest usable pose of the pushed object, where motion capture sees it: for the workspace only."""
     object_received_ns: int = 0
+    lag_ns: int = 0
+    """How much older odometry has become on its way than it was in the run's first second, by its own stamps."""
 
 
 NO_BASE = BaseRecord()

@@ -13,7 +13,16 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Mode, Phase, SafetyState, TickInput
-from safety import arm_checks, base_checks, clock_checks, host_checks, sensor_checks, task_checks, workspace_checks
+from safety import (
+    arm_checks,
+    base_checks,
+    clock_checks,
+    host_checks,
+    link_checks,
+    sensor_checks,
+    task_checks,
+    workspace_checks,
+)
 from safety.faults import FAULTS, Clears, strongest
 from safety.finding import value_of
 from safety.settings import SafetySettings
@@ -117,7 +126,7 @@ def _gather(
         faults.append("F36")
     if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has sent no data is not a fault
         return sensor_checks.note(state, inp), faults
-    for check in (sensor_checks.check, arm_checks.check, base_checks.check, workspace_checks.check):
+    for check in (sensor_checks.check, arm_checks.check, base_checks.check, link_checks.check, workspace_checks.check):
         state, found = check(settings, state, inp, control)
         faults += found
     return state, faults

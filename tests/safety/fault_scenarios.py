@@ -283,6 +283,8 @@ SCENARIOS = [
         "F31-hold", "half-open", old("base", "odometry_received_ns", "pose_received_ns", "newest_inbound_ns"),
         also=frozenset({"F40-slow"}),
     ),
+    Scenario("F32-slow", "lags", base(lag_ns=60_000_001)),
+    Scenario("F32-stop", "lags", base(lag_ns=120_000_001)),
     Scenario("F33", "stands", base(odometry=BodyTwist())),
     Scenario("F33", "goes elsewhere", base(odometry=BodyTwist(0.1, 0.06, 0.0))),
     Scenario("F33", "stands while approaching", base(odometry=BodyTwist()), approaching_at_full_speed),
