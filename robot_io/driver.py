@@ -15,7 +15,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from types import TracebackType
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
 
 import msgspec
 
@@ -113,6 +113,15 @@ class Base(Driver[BaseFeed], Protocol):
 
     def command(self, wanted: BodyTwist) -> BodyTwist:
         """Send a velocity (BODY frame, m/s, rad/s); return what was really sent. ValueError unless finite."""
+        ...
+
+
+@runtime_checkable
+class SharedBase(Protocol):
+    """A base that others can command as well, over a bus or a bridge: it is checked that nobody does."""
+
+    def take_command(self) -> None:
+        """Make sure that nobody else commands the base, and that our commands arrive. Raises DeviceError."""
         ...
 
 

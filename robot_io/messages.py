@@ -132,6 +132,8 @@ class DeviceInfo(msgspec.Struct, frozen=True, gc=False):
     version: str = ""
     """Of its firmware or software."""
     serial: str = ""
+    remarks: tuple[str, ...] = ()
+    """What was noticed while it was opened and the operator should know, in words."""
 
 
 class DeviceHealth(msgspec.Struct, frozen=True, gc=False):
@@ -181,6 +183,8 @@ class CommandEcho(msgspec.Struct, frozen=True, gc=False, tag=True):
     """A velocity heard on the base's own command topic, ours or another's: proof that commands get there."""
 
     twist: BodyTwist
+    ours: bool = True
+    """Whether this driver has sent it."""
 
 
 BaseFeed = BasePose | BaseOdometry | BaseReport | SliderPose | CommandEcho
@@ -275,6 +279,8 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     object_pose: Pose2D = Pose2D(_NAN, _NAN, _NAN)
     """The newest usable pose of the pushed object, where motion capture sees it: for the workspace only."""
     object_received_ns: int = 0
+    lag_ns: int = 0
+    """How much older odometry has become on its way than it was in the run's first second, by its own stamps."""
 
 
 NO_BASE = BaseRecord()

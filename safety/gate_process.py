@@ -20,7 +20,7 @@ import msgspec
 from msgspec.structs import astuple, replace
 
 from robot_io.clock import NS_PER_MS, asleep_ns, monotonic_ns
-from robot_io.driver import Base
+from robot_io.driver import Base, SharedBase
 from robot_io.errors import PushError
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.gate_frame import FRAME_BYTES, GateFrame, unpack_frame
@@ -30,6 +30,7 @@ from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
 from robot_io.log.gate_log import GateLog
+from robot_io.messages import BodyTwist, CommandEcho
 from robot_io.rig.config import BaseConfig, FramesConfig
 from safety.envelope import EnvelopeLimits
 from safety.gate_shell import GateShell
@@ -74,6 +75,7 @@ class GateProcess:
         self._log = GateLog(Ring(job.ring_fd).push, job.wall_offset_ns)
         self._shell = GateShell(job.limits, job.bounds, monotonic_ns())
         self._loop = EventLoop()
+        self._foreign_told = False
 
     def run(self) -> None:
         """Run until control is gone and zero has been sent to the base."""
@@ -137,9 +139,18 @@ class GateProcess:
             samples = tuple(replace(sample, received_ns=min(sample.received_ns, now_ns)) for sample in samples)
         for sample in samples:
             self._log.inbound(sample)
+            if isinstance(sample.value, CommandEcho) and not sample.value.ours:
+                self._tell_of_foreign(sample.value.twist)
         if samples:
             self._shell = self._shell.on_samples(samples)
             self._publish()
+
+    def _tell_of_foreign(self, twist: BodyTwist) -> None:
+        """Name the first velocity of somebody else: where the base then ignores ours (F33), this is why."""
+        if not self._foreign_told:
+            self._foreign_told = True
+            velocity = f"{twist.vx:.2f} m/s forward, {twist.vy:.2f} m/s left, {twist.omega:.2f} rad/s"
+            self._status.say("warning", text=f"somebody else commands the base as well: {velocity} was heard")
 
     def _send_due(self) -> None:
         now_ns = monotonic_ns()
@@ -192,12 +203,16 @@ def main(kind: type[JobT], wrapped: Callable[[Base, JobT], Base]) -> int:
             folder=job.kind_folder,
         )
         info = started(base, "base", job.base.kind)
+        if isinstance(base, SharedBase):
+            base.take_command()
     except PushError as error:  # the process ends, which closes everything that was open
         status.error(error)
         return error.exit_code
     process = GateProcess(job, wrapped(base, job), status)
     realtime = try_realtime(PRIORITY)
     status.say("ready", info=msgspec.to_builtins(info), realtime=realtime)
+    for remark in info.remarks:
+        status.say("warning", text=remark)
     gc.collect()
     gc.freeze()
     lock_memory()

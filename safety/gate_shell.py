@@ -33,6 +33,7 @@ from robot_io.messages import (
     Stamped,
 )
 from safety import gate
+from safety.bridge_lag import Lag
 from safety.clock_checks import JUMP_NS
 from safety.envelope import EnvelopeLimits
 from safety.gate import GateState, Latch
@@ -69,6 +70,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
     """When the gate could last send; used to detect a pause of the gate that is too long."""
     gate: GateState = GateState()
     travel: Travel = Travel()
+    lag: Lag = Lag()
     record: BaseRecord = BaseRecord()
     """The record of base and gate that control reads."""
     asleep_ns: int | None = None
@@ -98,7 +100,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
 
     def on_samples(self, samples: Sequence[Stamped[BaseFeed]]) -> GateShell:
         """Process samples from the base, oldest first; three consecutive measured speeds beyond the limits latch."""
-        state, travel, changes = self.gate, self.travel, dict[str, Any]()
+        state, travel, lag, changes = self.gate, self.travel, self.lag, dict[str, Any]()
         pose_seq, odometry_seq = self.record.pose_seq, self.record.odometry_seq
         for sample in samples:
             value, at_ns = sample.value, sample.received_ns
@@ -107,7 +109,8 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
                 changes.update(pose=value.pose, pose_valid=value.valid, pose_received_ns=at_ns)
             elif isinstance(value, BaseOdometry):
                 odometry_seq += 1
-                changes.update(odometry=value.twist, odometry_received_ns=at_ns)
+                lag = lag.on_stamp(at_ns, sample.device_time_s)
+                changes.update(odometry=value.twist, odometry_received_ns=at_ns, lag_ns=lag.growth_ns)
                 state = gate.on_speed(self.limits, state, value.twist)
                 travel = travel.on_speed(value.twist, at_ns)
             elif isinstance(value, BaseReport):
@@ -118,7 +121,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         if not changes:
             return self
         record = replace(self.record, pose_seq=pose_seq, odometry_seq=odometry_seq, **changes)
-        return replace(self, gate=state, travel=travel, record=record)
+        return replace(self, gate=state, travel=travel, lag=lag, record=record)
 
     def on_clock(self, now_ns: int, health: DeviceHealth) -> GateShell:
         """Latch when control has been silent too long or the base's link is gone."""

@@ -20,6 +20,7 @@ from safety import (
     clock_checks,
     force_checks,
     host_checks,
+    link_checks,
     motion_checks,
     sensor_checks,
     stuck_checks,
@@ -132,7 +133,7 @@ def _gather(
     # The force first: it compares with the last reading, on which the sensor's check moves on.
     checks = (
         *(force_checks, sensor_checks, stuck_checks, arm_checks),
-        *(base_checks, motion_checks, agreement_checks, workspace_checks),
+        *(base_checks, link_checks, motion_checks, agreement_checks, workspace_checks),
     )
     for check in (module.check for module in checks):
         state, found = check(settings, state, inp, control)

@@ -13,32 +13,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, Self
 
+from msgspec.structs import replace
+
 from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
 from robot_io.driver import DriverBase, no_more_options
 from robot_io.errors import ConfigError, DeviceUnreachable
-from robot_io.messages import (
-    BaseFeed,
-    BodyTwist,
-    CommandEcho,
-    DeviceHealth,
-    DeviceInfo,
-    LinkState,
-    Pose2D,
-    Stamped,
-)
+from robot_io.messages import BaseFeed, BodyTwist, CommandEcho, DeviceHealth, DeviceInfo, LinkState, Pose2D, Stamped
 from robot_io.ridgeback.echo_watch import EchoWatch
 from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
 from robot_io.ridgeback.intake import Intake
 from robot_io.ridgeback.open_socket import parse_url
 from robot_io.ridgeback.pending import PendingSamples
-from robot_io.ridgeback.preflight import check_topics
-from robot_io.ridgeback.rosbridge_codec import (
-    check_finite,
-    encode_advertise,
-    encode_subscribe,
-    encode_twist,
-    spell_type,
-)
+from robot_io.ridgeback.preflight import check_topics, join
+from robot_io.ridgeback.rosbridge_codec import check_finite, encode_twist, spell_type
+from robot_io.ridgeback.sole_command import check_alone
 from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink
 from robot_io.rig.topics import TopicsConfig
 
@@ -50,7 +38,6 @@ LINK_STALE_NS = 300 * NS_PER_MS
 """The link is given up when nothing has come from the bridge for this long, or no command of ours was heard back."""
 BACKLOG_NS = 200 * NS_PER_MS
 """The link is reset when more waits than can be read, for longer than this."""
-PING_PERIOD_NS = 100 * NS_PER_MS
 FIRST_MESSAGE_TIMEOUT_S = 2.0
 
 ZERO = BodyTwist()
@@ -67,8 +54,7 @@ class Ridgeback(DriverBase):
     before_close: called with the descriptor just before the socket is closed, also when the link is given up: an event
         loop must forget it then.
 
-    Raises ConfigError: an address that is not a websocket url, or topics that cannot serve the pose source. For one
-    thread at a time, and it starts none.
+    Raises ConfigError: an address that is no websocket url, topics that cannot serve the pose source. Starts no thread.
     """
 
     def __init__(
@@ -97,7 +83,6 @@ class Ridgeback(DriverBase):
         self._cause = ""
         self._pending = PendingSamples()
         self._intake = Intake(self._reader, clock)
-        self._last_ping_ns = 0
         self._echoes = EchoWatch()
         self._started = False
         self.newest_inbound_ns = 0
@@ -128,21 +113,16 @@ class Ridgeback(DriverBase):
         self._state = LinkState.OPENING
         self._link = link = WebSocketLink.connect(self.url, self._clock)
         try:
-            open_questions = check_topics(
-                link, self.url, self._topic, {self._topic: self._type, **self._types}, self._clock
-            )
-            link.send_text(encode_advertise(self._topic, self._type))
-            for topic, type_name in self._types.items():
-                link.send_text(encode_subscribe(topic, type_name))
-            link.send_text(encode_subscribe(self._topic, self._type))
+            answers = check_topics(link, self.url, self._topic, {self._topic: self._type, **self._types}, self._clock)
+            join(link, self._topic, self._type, self._types)
         except LinkLost as lost:
             self._give_up(str(lost))
             raise DeviceUnreachable(str(lost), where=self.url, do="Check the bridge's log on the robot") from lost
         except BaseException:
             self.close()
             raise
-        self._counters["unanswered_checks"] = len(open_questions)
-        return DeviceInfo("ridgeback", self.url, "Ridgeback", link.server)
+        self._counters["unanswered_checks"] = len(answers.unanswered)
+        return DeviceInfo("ridgeback", self.url, "Ridgeback", link.server, remarks=answers.remarks(self._topic))
 
     def start(self) -> None:
         """Wait for the first message of pose, odometry and status; at most 2 s.
@@ -151,15 +131,30 @@ class Ridgeback(DriverBase):
         """
         until_ns = self._clock() + int(FIRST_MESSAGE_TIMEOUT_S * NS_PER_S)
         while silent := self._reader.silent_topics():
-            link = self._link
-            if link is None:
-                raise DeviceUnreachable(self._cause or "not open", where=self.url, do="Open the driver again")
-            if not link.wait_readable(until_ns):
+            if not self._wait(until_ns):
                 raise self._intake.refused.explain(silent, self.url, FIRST_MESSAGE_TIMEOUT_S)
             self._receive()
         self._started = True
         if self._link is not None:
             self._state = LinkState.UP
+
+    def take_command(self) -> None:
+        """Make sure that nobody else commands the base and that what we send arrives; at most 2.3 s, after `start`.
+
+        Listens to the command topic for 0.3 s, then sends zeros until one is heard back. Raises DeviceNotReady when
+        somebody else is heard, or none of ours within 2 s, and DeviceUnreachable when the link breaks.
+        """
+        check_alone(self._echoes, self._receive_until, lambda: self.command(ZERO), self._clock, self.url)
+
+    def _receive_until(self, until_ns: int) -> None:
+        while self._wait(until_ns):
+            self._receive()
+
+    def _wait(self, until_ns: int) -> bool:
+        """Return whether something arrived before `until_ns`. Raises DeviceUnreachable where the link is gone."""
+        if self._link is None or self._state == LinkState.LOST:
+            raise DeviceUnreachable(self._cause or "not open", where=self.url, do="Open the driver again")
+        return self._link.wait_readable(until_ns)
 
     def fileno(self) -> int:
         """Return the socket's descriptor, -1 when there is none."""
@@ -205,12 +200,8 @@ class Ridgeback(DriverBase):
         Counters since `open`: `messages`, `undecodable`, `sent`, `held_back` (motion turned into zero on a quiet link),
         `dropped_samples`, `unanswered_checks`, `pings`, and one for each kind of sample.
         """
-        counters = {
-            **self._intake.counters,
-            **self._counters,
-            "dropped_samples": self._pending.dropped,
-            **self._reader.counters,
-        }
+        counters = {**self._intake.counters, **self._counters, **self._reader.counters}
+        counters["dropped_samples"] = self._pending.dropped
         return DeviceHealth(self._state, self._cause, counters, self._pending.pose_rate_hz())
 
     def stop(self) -> None:
@@ -232,7 +223,7 @@ class Ridgeback(DriverBase):
         self._cause = ""
         self._pending.clear()
         self._intake.reset()
-        self.newest_inbound_ns = self.newest_pong_ns = self.sent_ns = self._last_ping_ns = 0
+        self.newest_inbound_ns = self.newest_pong_ns = self.sent_ns = 0
         self._echoes = EchoWatch()
         self._counters = dict.fromkeys(self._counters, 0)
 
@@ -250,9 +241,8 @@ class Ridgeback(DriverBase):
         self.newest_inbound_ns = max(self.newest_inbound_ns, self._intake.newest_inbound_ns)
         self.newest_pong_ns = link.newest_pong_ns
         for sample in samples:
-            if isinstance(sample.value, CommandEcho):
-                self._echoes.on_heard(sample.value.twist)
-            self._pending.add(sample)
+            ours = not isinstance(sample.value, CommandEcho) or self._echoes.on_heard(sample.value.twist)
+            self._pending.add(sample if ours else replace(sample, value=replace(sample.value, ours=False)))
 
     def _tend(self, now_ns: int) -> None:
         if self._link is None or not self._started:
@@ -264,11 +254,9 @@ class Ridgeback(DriverBase):
             self._give_up(f"the bridge has sent more than can be read for {BACKLOG_NS / NS_PER_S:g} s")
         elif (since_ns := self._echoes.unheard_since_ns) and now_ns - since_ns > LINK_STALE_NS:  # queued, or discarded
             self._stop_believing(f"the bridge echoed none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
-        elif now_ns - self._last_ping_ns >= PING_PERIOD_NS:
-            self._last_ping_ns = now_ns
-            self._counters["pings"] += 1
+        else:
             try:
-                self._link.send_ping(now_ns.to_bytes(8, "big"))
+                self._counters["pings"] += self._link.ping_if_due(now_ns)
             except LinkLost as lost:
                 self._give_up(str(lost))
 
@@ -299,8 +287,7 @@ class Ridgeback(DriverBase):
 
     def _give_up(self, cause: str) -> None:
         """Reset a connection that is broken or floods us; never reopened from here."""
-        link, self._link = self._link, None
-        self._started = False
+        link, self._link, self._started = self._link, None, False
         if link is not None:
             self._announce(link)
             link.abort()

@@ -32,14 +32,16 @@ class EchoWatch:
         if self.heard and not self.unheard_since_ns:  # before the first, ROS may still be connecting
             self.unheard_since_ns = now_ns
 
-    def on_heard(self, twist: BodyTwist) -> None:
-        """Note a velocity heard on the command topic."""
-        if any(_same(twist, ours) for ours in reversed(self._sent)):
+    def on_heard(self, twist: BodyTwist) -> bool:
+        """Note a velocity heard on the command topic; return whether it is ours."""
+        ours = any(_same(twist, sent) for sent in reversed(self._sent))
+        if ours:
             self.heard += 1
             self.unheard_since_ns = 0
         else:
             self.foreign += 1
             self.newest_foreign = twist
+        return ours
 
 
 def _same(a: BodyTwist, b: BodyTwist) -> bool:

@@ -115,6 +115,10 @@ class _TopicType(msgspec.Struct, gc=False):
     type: str
 
 
+class _Publishers(msgspec.Struct, gc=False):
+    publishers: list[str]
+
+
 class _Subscribers(msgspec.Struct, gc=False):
     subscribers: list[str]
 
@@ -122,6 +126,7 @@ class _Subscribers(msgspec.Struct, gc=False):
 _decode_envelope = decoder_of(_Envelope)
 _decode_topic_type = decoder_of(_TopicType)
 _decode_subscribers = decoder_of(_Subscribers)
+_decode_publishers = decoder_of(_Publishers)
 
 
 def decode_frame(text: bytes) -> Inbound:
@@ -137,6 +142,11 @@ def decode_frame(text: bytes) -> Inbound:
 def decode_topic_type(values: bytes) -> str:
     """Decode the answer of /rosapi/topic_type ("" for a topic nobody knows)."""
     return _decode_topic_type(values).type
+
+
+def decode_publishers(values: bytes) -> list[str]:
+    """Decode the answer of /rosapi/publishers: node names."""
+    return _decode_publishers(values).publishers
 
 
 def decode_subscribers(values: bytes) -> list[str]:

@@ -29,6 +29,7 @@ CLOSE_TIMEOUT_S = 0.05
 SEND_BUFFER_BYTES = 16_384
 """Small: what does not fit into it is old before it arrives."""
 
+PING_PERIOD_NS = 100 * NS_PER_MS
 MOST_FRAMES = 200
 """Frames read in one call ..."""
 READ_NS = 2 * NS_PER_MS
@@ -56,6 +57,7 @@ class WebSocketLink:
         self._parts: list[bytes] | None = None
         self._unparsed = memoryview(b"")
         self._unparsed_ns = 0
+        self._last_ping_ns = 0
         self.behind = False
         """Whether the last `receive` left something unread because its bounds were reached."""
         self._lost: LinkLost | None = None
@@ -115,6 +117,14 @@ class WebSocketLink:
         self._raise_if_lost()
         self._protocol.send_ping(payload)
         self._flush()
+
+    def ping_if_due(self, now_ns: int) -> bool:
+        """Send a ping every PING_PERIOD_NS; return whether one was sent. Raises LinkLost like `send_text`."""
+        due = now_ns - self._last_ping_ns >= PING_PERIOD_NS
+        if due:
+            self._last_ping_ns = now_ns
+            self.send_ping(now_ns.to_bytes(8, "big"))
+        return due
 
     def wait_readable(self, until_ns: int) -> bool:
         """Wait until something arrives; False once `until_ns` has passed, however much still comes."""

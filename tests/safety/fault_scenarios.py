@@ -416,6 +416,8 @@ SCENARIOS = [
         "F31-hold", "half-open", old("base", "odometry_received_ns", "pose_received_ns", "newest_inbound_ns"),
         also=frozenset({"F40-slow"}),
     ),
+    Scenario("F32-slow", "lags", base(lag_ns=60_000_001)),
+    Scenario("F32-stop", "lags", base(lag_ns=120_000_001)),
     Scenario("F33", "stands", then(base(odometry=BodyTwist()), creeping_pose(x=-0.1))),
     Scenario("F33", "goes elsewhere", then(base(odometry=BodyTwist(0.1, 0.06, 0.0)), creeping_pose(y=0.06))),
     Scenario("F33", "stands while approaching", then(base(odometry=BodyTwist()), creeping_pose(x=-0.05)),

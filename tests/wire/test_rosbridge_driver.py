@@ -300,7 +300,7 @@ def test_a_silent_topic_is_named():
 
 def test_without_rosapi_it_goes_on_and_counts():
     with running_bridge(bridge={"rosapi": False}) as bridge, Ridgeback(bridge.url, topics=QUICK) as base:
-        assert base.health().counters["unanswered_checks"] == 4  # who listens, and three types
+        assert base.health().counters["unanswered_checks"] == 5  # who listens, who commands, and three types
         assert base.command(FORWARD) == FORWARD
         assert until(lambda: base.drain() is not None and (0.1, 0.0, 0.0) in [e[1:] for e in bridge.heard()])
 

@@ -168,6 +168,8 @@ class Launcher:
                 self._live.say(f"gate: {event['text']}")
             elif event.get("event") == "warning":
                 self._live.say(event["text"])
+                if child.name == "gate":
+                    self.notes.append(event["text"])
             elif child.name == "recorder" and event.get("event") == "error":
                 self._live.say(f"recorder: {event['error']['what']}")
                 if self._began:

@@ -1,0 +1,132 @@
+"""A bridge whose queue grows: its messages are fresh by arrival and old by their stamps.
+
+Above 60 ms more than in the run's first second: SLOW, above 120 ms: STOP.
+"""
+
+import contextlib
+import math
+
+import pytest
+from msgspec.structs import replace
+
+from robot_io.messages import BaseOdometry, BodyTwist, Stamped
+from robot_io.tick import ControlState, SafetyState
+from safety import link_checks
+from safety.bridge_lag import Lag
+from safety.envelope import EnvelopeLimits
+from safety.gate_shell import GateShell
+from safety.motion_bounds import TravelLimits
+from safety.settings import SafetySettings
+from tests.safety.fold_bench import FoldBench
+from tests.safety.test_gate_alone import Gate
+from tests.wire.bridge_process import running_bridge
+from tools.rig import resolve_rig
+
+MS = 1_000_000
+EPOCH_S = 1.76e9
+"""The robot's clock: seconds since 1970, and this machine's counts from its start."""
+
+
+NEW = Lag()
+
+
+def heard(lag_ms_at, until_ms: int, lag: Lag = NEW, since_ms: int = 0) -> Lag:
+    """Return the lag after odometry at 50 Hz, each message `lag_ms_at(sent at ms)` on its way."""
+    for sent_ms in range(since_ms, until_ms, 20):
+        lag = lag.on_stamp(round((5_000 + sent_ms + lag_ms_at(sent_ms)) * MS), EPOCH_S + sent_ms * 1e-3)
+    return lag
+
+
+def first_above(limit_ms: float, lag_ms_at) -> int:
+    """Return the time (ms) of the first message at which the lag is above a limit."""
+    lag = Lag()
+    for sent_ms in range(0, 20_000, 20):
+        lag = heard(lag_ms_at, sent_ms + 20, lag, sent_ms)
+        if lag.growth_ns > limit_ms * MS:
+            return sent_ms
+    raise AssertionError("never")
+
+
+def test_a_steady_bridge_does_not_lag_however_far_the_clocks_are_apart():
+    assert heard(lambda _: 35.0, 60_000).growth_ns < MS
+    assert heard(lambda _: -9e6, 60_000).growth_ns < MS
+
+
+def test_a_lag_that_grows_by_30_ms_a_second_is_seen():
+    """From 1 s on, when the baseline stands: 60 ms after 2 s more, 120 ms after 4 s."""
+
+    def grows(ms: int) -> float:
+        return 5.0 + 0.03 * max(ms - 1_000, 0)
+
+    assert 3_000 <= first_above(60.0, grows) <= 3_200
+    assert 5_000 <= first_above(120.0, grows) <= 5_250
+
+
+@pytest.mark.parametrize("limit_ms", [60.0, 120.0])
+def test_a_lag_that_begins_at_once_is_seen_with_the_third_message(limit_ms):
+    """The first two may be late for other reasons; at 50 Hz that is within the rows' 6 and 12 ticks."""
+    assert first_above(limit_ms, lambda ms: 5.0 if ms < 3_000 else 6.0 + limit_ms) == 3_040
+
+
+def test_two_late_messages_are_no_lag():
+    late = heard(lambda ms: 200.0 if ms in (3_000, 3_020) else 5.0, 3_040)
+    assert late.growth_ns < MS
+
+
+def test_what_a_pause_of_this_machine_delayed_is_no_lag():
+    """90 ms: five messages are read at once when it goes on, the newest of them hardly old."""
+    lag = heard(lambda ms: 5.0 if not 3_000 <= ms < 3_090 else 3_095.0 - ms, 3_090)
+    assert lag.growth_ns < 60 * MS
+
+
+def test_in_the_first_second_nothing_is_judged():
+    assert heard(lambda ms: 5.0 if ms < 500 else 300.0, 700).growth_ns == 0  # the last arrives at 0.98 s
+
+
+def test_a_slow_first_message_is_not_the_baseline():
+    assert heard(lambda ms: 300.0 if ms < 200 else 5.0, 3_000).growth_ns < MS
+    assert heard(lambda ms: 300.0 if ms < 200 else 5.0 if ms < 2_000 else 70.0, 3_000).growth_ns > 60 * MS
+
+
+def test_clocks_that_drift_by_500_ppm_are_no_lag():
+    assert heard(lambda ms: 5.0 + 490e-6 * ms, 600_000).growth_ns < 2 * MS
+    assert heard(lambda ms: 5.0 - 490e-6 * ms, 600_000).growth_ns < 2 * MS
+
+
+@pytest.mark.parametrize("stamp_s", [math.nan, math.inf, 0.0, -1.0])
+def test_a_message_without_a_stamp_is_left_out(stamp_s):
+    lag = heard(lambda _: 5.0, 2_000)
+    assert lag.on_stamp(99_000 * MS, stamp_s) == lag
+
+
+@pytest.mark.parametrize(
+    ("lag_ns", "found"),
+    [(60 * MS, []), (60 * MS + 1, ["F32-slow"]), (120 * MS, ["F32-slow"]), (120 * MS + 1, ["F32-stop"])],
+)
+def test_the_limits(lag_ns, found):
+    settings, inp = SafetySettings.of(resolve_rig("sim")), FoldBench().good_input()
+    lagging = replace(inp, base=replace(inp.base, lag_ns=lag_ns))
+    _, faults = link_checks.check(settings, SafetyState(), lagging, ControlState())
+    assert faults == found
+    assert [fault.value for fault in faults] == [lag_ns / MS] * len(found)
+
+
+def test_the_gate_puts_it_into_its_record():
+    shell = GateShell(EnvelopeLimits(0.15, 0.25, 0.5, 1.0, 10 * MS, 0.0, 0.0), TravelLimits(2.0, 30.0), 0)
+    for ms in range(0, 3_000, 20):
+        late = 0 if ms < 2_000 else 80
+        sample = Stamped(BaseOdometry(BodyTwist()), 0, (5_000 + ms + late) * MS, EPOCH_S + ms * 1e-3)
+        shell = shell.on_samples([sample])
+    assert shell.record.lag_ns == pytest.approx(80 * MS, abs=MS)
+
+
+def test_on_the_wire():
+    """An emulated bridge that holds everything back by 90 ms, after a second without."""
+    with running_bridge() as bridge, contextlib.closing(Gate(bridge.url)) as gate:
+        gate.wait_ready()
+        gate.tell_for(BodyTwist(), 1_300)
+        assert gate.link.read().lag_ns < 40 * MS
+        bridge.do("lag", 0.09)
+        gate.tell_until(BodyTwist(), lambda: gate.link.read().lag_ns > 60 * MS)
+        gate.tell_for(BodyTwist(), 100)
+        assert 60 * MS < gate.link.read().lag_ns < 130 * MS
