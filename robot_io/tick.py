@@ -363,7 +363,7 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     """Ticks left in which a pause of the host is not taken for a dead device."""
     last_ft_ns: int = 0
     frozen_run: int = 0
-    """Equal readings in a row of the axis that has repeated itself longest."""
+    """Equal readings in a row of all axes at once."""
     last_ft_force: Vector3 = (0.0, 0.0, 0.0)
     last_ft_torque: Vector3 = (0.0, 0.0, 0.0)
     arm_packets: int = 0

@@ -62,7 +62,7 @@ def check(
     if control.force_before_contact_N > BEFORE_CONTACT_N:
         faults.append(Finding("F09-before", control.force_before_contact_N))
     force = replace(force, axis_runs=runs, before_last=before, wrong_run=wrong)
-    return replace(state, force=force, frozen_run=frozen), faults
+    return replace(state, force=force, frozen_run=min(runs)), faults
 
 
 def _damaged(state: ForceState, inp: TickInput) -> ForceState:

@@ -153,7 +153,7 @@ class ControlConfig(Table, frozen=True):
     force_filter_tau_s: Annotated[float, Meta(ge=0, le=2)] = 0.05
     """Time constant of the low-pass on the force; 0: none."""
     force_min_N: Annotated[float, Meta(gt=0, le=50)] = 5.0
-    """Below this horizontal force there is no contact."""
+    """This horizontal force is contact at once; a lighter object is felt by its mean, from 2.5 N on."""
     contact_samples: Annotated[int, Meta(ge=1, le=100)] = 5
     """This many readings in a row above `force_min_N` are contact, at 100 a second; in proportion for other rates."""
     heading_gain_per_s: Annotated[float, Meta(ge=0, le=5)] = 1.0

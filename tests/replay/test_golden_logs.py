@@ -32,6 +32,11 @@ class Golden(NamedTuple):
     first_push_tick: int = 0
     """First tick of mode PUSHING."""
 
+    @property
+    def before_the_force(self) -> int:
+        """Ticks that no change of how the force is used may touch: all before it is tared, or the first packets."""
+        return 3 if self is GOLDEN["sim-barrel-in-contact"] else self.first_push_tick - 1
+
 
 GOLDEN = {
     "sim": Golden(13131, 969, 968, (), 121),
@@ -72,10 +77,12 @@ def check_events(capsys: Any, log: Path, golden: Golden) -> None:
 def check_replay(capsys: Any, log: Path, golden: Golden, *, complete: bool) -> None:
     for machine in (SAME_MACHINE, OTHER_MACHINE):
         code, found = replayed(capsys, log, *machine)
-        if code != 7 or not found["machine_differences"]:
+        if not found["machine_differences"]:
             break
-    assert code == 0, found
-    assert (found["ticks"], found["identical"], found["gaps"]) == (golden.ticks, golden.ticks, 0)
+    assert code == 7, found
+    assert found["made_by"]["other"], "the law sees the median of three readings now: said to be other code, not damage"
+    assert (found["ticks"], found["gaps"]) == (golden.ticks, 0)
+    assert golden.before_the_force <= found["identical"] < golden.ticks
     assert (found["world"]["states"], found["world"]["identical"]) == (golden.states, golden.states)
     assert found["complete"] == complete
 
@@ -122,8 +129,8 @@ def test_report_makes_a_page_of_it(name, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", GOLDEN)
-def test_replay_verifies_every_tick_with_the_rig_s_keys_as_they_were_called_then(name, capsys):
-    """In two logs the tare's time and both limits of the arm's drift decide what happens: defaults would differ."""
+def test_replay_verifies_world_topics_and_start_with_the_rig_s_keys_as_they_were_called_then(name, capsys):
+    """In two logs the tare's time decides how long the start is: the default would differ."""
     check_replay(capsys, LOGS / f"{name}.mcap", GOLDEN[name], complete=True)
 
 
