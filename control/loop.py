@@ -16,8 +16,9 @@ from msgspec.structs import replace
 
 from control.pacer import wake
 from control.run_notes import RunNotes
+from control.silence import Silence
 from control.timing import LoopTiming
-from robot_io.clock import ClockNs, monotonic_ns
+from robot_io.clock import ClockNs, asleep_ns, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
 from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.ring import Ring
@@ -38,6 +39,8 @@ from robot_io.tick import (
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
 LOG_LOST = b"L"[0]
 """The launcher reports that the recorder can no longer write: treated as if it were gone."""
+BEAT = b"H"[0]
+"""The launcher lives."""
 FLOOD_S = 0.64
 """More packets in one tick than the sensor sends in this time are a flood; the oldest are dropped."""
 
@@ -94,6 +97,7 @@ class ControlLoop:
         operator_fd: int,
         on_status: Callable[[TickInput, TickState, TickOutput], None],
         clock: ClockNs = monotonic_ns,
+        asleep: Callable[[], int | None] = asleep_ns,
     ) -> None:
         self._fold = fold
         self._state = state
@@ -103,6 +107,8 @@ class ControlLoop:
         self._operator_fd = operator_fd
         self._on_status = on_status
         self._clock = clock
+        self._read_asleep_ns = asleep
+        self._asleep_ns = 0
         self._loop = EventLoop()
         self._timer: Timer | None = None
         self._tick = -1
@@ -113,6 +119,8 @@ class ControlLoop:
         self._taken = 0
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator = Operator.NONE
+        self._launcher, self._recorder = Silence(), Silence()
+        self._consumed = 0
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
         self.notes = RunNotes()
@@ -125,9 +133,11 @@ class ControlLoop:
         self._sensor_fd = self._sensor.fileno()
         self._loop.add_fd(self._sensor_fd, self._on_sensor)
         self._loop.add_fd(self._operator_fd, self._on_operator)
+        os.set_blocking(self._operator_fd, False)
         for name, pidfd in self._watch.pidfds.items():
             self._loop.add_fd(pidfd, partial(self._on_gone, name))
         self.first_ns = self._clock() + self._period_ns
+        self._launcher.heard(self.first_ns)
         self._timer = self._loop.call_at(self.first_ns, self._on_deadline)
         try:
             self._loop.run()
@@ -161,14 +171,20 @@ class ControlLoop:
         del self._readings[: -self._most_readings]
 
     def _on_operator(self, _events: int) -> None:
+        if self._operator_fd < 0:
+            return
         try:
             typed = os.read(self._operator_fd, 64)
         except BlockingIOError:
             return
+        self._launcher.heard(self._clock())
         if not typed:  # the launcher is gone
             self._loop.remove_fd(self._operator_fd)
+            self._operator_fd = -1
             typed = b"S"
         for key in typed:
+            if key == BEAT:
+                continue
             if key == LOG_LOST:
                 self._watch.gone.add("recorder")
                 continue
@@ -186,6 +202,8 @@ class ControlLoop:
         self._timer = self._loop.call_at(paced.next_deadline_ns, self._on_deadline)
         self._tick += 1 + paced.skipped
         self._collect()
+        self._on_operator(0)
+        self._note_silence(paced.skipped * self._period_ns)
         # Drained first: packets that arrived during a pause are read before their age is judged.
         inp = self._input(self._clock(), paced.late_ns, paced.skipped)
         try:
@@ -204,7 +222,7 @@ class ControlLoop:
         self._ring.push(Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, before, after, output)))
         self._state = after
         self.last = (inp, after, output)
-        self.notes.note(inp, output)
+        self.notes.note(inp, after, output)
         if inp.tick % self._status_every == 0 or output.finished:
             self._on_status(inp, after, output)
         if output.finished:
@@ -214,36 +232,30 @@ class ControlLoop:
         self.error = error
         self._loop.stop()
         self._base.command(BodyTwist(), tick=inp.tick + 1, mode=0)
-        failed = TickInput(
-            inp.tick,
-            inp.now_ns,
-            inp.operator,
-            HostInput(
-                inp.host.late_ns,
-                inp.host.skipped,
-                inp.host.gate_alive,
-                inp.host.arm_alive,
-                inp.host.recorder_alive,
-                True,
-                inp.host.log_dropped,
-            ),
-            inp.ft,
-            inp.arm,
-            inp.base,
-        )
+        failed = replace(inp, host=replace(inp.host, loop_error=True))
         before = self._state
         after, output = self._fold(before, failed)
         self._ring.push(
             Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, failed, before, after, output))
         )
         self.last = (failed, after, output)
-        self.notes.note(failed, output)
+        self.notes.note(failed, after, output)
+
+    def _note_silence(self, pause_ns: int) -> None:
+        self._launcher.leave_out(pause_ns)
+        self._recorder.leave_out(pause_ns)
+        if self._ring.consumed != self._consumed or not self._ring.unread:
+            self._consumed = self._ring.consumed
+            self._recorder.heard(self._clock())
 
     def _input(self, now_ns: int, late_ns: int, skipped: int) -> TickInput:
         gone = self._watch.gone
         record = self._arm.read()
         if record is not None:
             self._arm_record = record
+        asleep_ns = self._read_asleep_ns()
+        if asleep_ns is not None:
+            self._asleep_ns = asleep_ns
         readings, self._readings = self._readings, []
         operator, self._operator = self._operator, Operator.NONE
         return TickInput(
@@ -258,6 +270,9 @@ class ControlLoop:
                 "recorder" not in gone,
                 False,
                 self._ring.dropped,
+                self._launcher.so_far_ns(now_ns),
+                self._recorder.so_far_ns(now_ns),
+                self._asleep_ns,
             ),
             ft_input(readings, self._health, self._taken),
             self._arm_record,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from control.push_course import PushCourse
 from robot_io.tick import Mode, Phase, TickInput, TickOutput, TickState
 
 MOST_EVENTS = 200
@@ -16,11 +19,13 @@ class RunNotes:
     def __init__(self) -> None:
         self.events: list[dict[str, object]] = []
         self.fault_counts: dict[str, int] = {}
+        self.course = PushCourse()
         self._last: tuple[int, tuple[str, ...]] = (int(Mode.SILENT), ())
         self._first_ns = 0
 
-    def note(self, inp: TickInput, output: TickOutput) -> None:
-        """Record one tick."""
+    def note(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
+        """Record one tick and the state after it."""
+        self.course.note(after.control.phase, after.control.progress_m, after.control.lateral_m)
         if not self._first_ns:
             self._first_ns = inp.now_ns
         if (output.mode, output.faults) == self._last:
@@ -39,10 +44,14 @@ class RunNotes:
             )
         self._last = (output.mode, output.faults)
 
+    def figures(self) -> dict[str, object]:
+        """Return the notes as part of a run's figures."""
+        return {"events": self.events, "fault_counts": self.fault_counts, **self.course.figures()}
+
 
 def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
-    """Return the final figures of a run (m, N)."""
-    control = state.control
+    """Return the final figures of a run (m, N, s since its first tick)."""
+    control, safety = state.control, state.safety
     ended = control.phase in (Phase.RETREAT, Phase.CHECK, Phase.DONE, Phase.FAILED)
     return {
         "exit_code": output.exit_code,
@@ -51,8 +60,15 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "faults": list(output.faults),
         "distance_m": control.end_progress_m if ended else control.progress_m,
         "lateral_error_m": control.end_lateral_m if ended else control.lateral_m,
+        "first_fault": safety.first_fault,
+        "first_value": safety.first_value if math.isfinite(safety.first_value) else None,
+        "first_fault_s": (safety.first_fault_ns - safety.first_ns) * 1e-9 if safety.first_fault else None,
+        "latch_cause": inp.base.latch_cause,
+        "log_dropped": inp.host.log_dropped,
         "contact_seen": control.contact_seen,
-        "residual_N": control.residual_N if control.residual_N == control.residual_N else None,
+        "residual_N": control.residual_N if math.isfinite(control.residual_N) else None,
+        "early_contact": control.early_contact,
+        "force_before_contact_N": force_N if math.isfinite(force_N := control.force_before_contact_N) else None,
         "bias_force_N": list(control.bias_force),
         "bias_torque_Nm": list(control.bias_torque),
         "tared": control.tared,

@@ -14,6 +14,11 @@ NS_PER_MS = 1_000_000
 
 ClockNs = Callable[[], int]
 
+BRACKET_NS = NS_PER_MS
+"""A reading of two clocks that took longer says too little ..."""
+BRACKET_TRIES = 5
+"""... and is repeated this often."""
+
 SIM_EPOCH_NS = 1_600_000_000 * NS_PER_S
 """Log time of tick 0 at level `sim` (a fixed instant, so that two runs give identical files)."""
 
@@ -29,6 +34,20 @@ def wall_offset_ns() -> int:
     wall = time.time_ns()
     after = time.monotonic_ns()
     return wall - (before + after) // 2
+
+
+def asleep_ns() -> int | None:
+    """Return how far CLOCK_BOOTTIME is ahead of CLOCK_MONOTONIC in ns: it grows only while this machine is suspended.
+
+    None where it could not be read within BRACKET_NS, because this process was paused in between, over and over.
+    """
+    for _ in range(BRACKET_TRIES):
+        before = time.monotonic_ns()
+        boot = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+        after = time.monotonic_ns()
+        if after - before <= BRACKET_NS:
+            return boot - (before + after) // 2
+    return None
 
 
 class VirtualClock:

@@ -12,6 +12,7 @@
     |-- ContactLost       6   the object was lost, or never met
     |-- ReplayDiffers     7   a log folds to other bytes than it holds
     |-- LogDamaged        8   a log that cannot be trusted or read
+    |-- NotDone           9   the distance was reached, but off the line or on evidence that cannot be trusted
     `-- OperatorStop    130   stopped by the operator, after a clean brake
 
 The number is the exit code of the `push` program. Each message says what happened, where, and what to do.
@@ -98,6 +99,12 @@ class LogDamaged(PushError):
     """A log that is truncated, altered or not a log of this program."""
 
     exit_code = 8
+
+
+class NotDone(PushError):
+    """The push reached its distance, but off the line or on evidence that cannot be trusted."""
+
+    exit_code = 9
 
 
 class OperatorStop(PushError):

@@ -119,6 +119,12 @@ class HostInput(msgspec.Struct, frozen=True, gc=False):
     recorder_alive: bool
     loop_error: bool
     log_dropped: int
+    launcher_silent_ns: int = 0
+    """How long the launcher, which has the operator's keys, has given no sign of life."""
+    recorder_silent_ns: int = 0
+    """How long the recorder has taken nothing of what waited for it."""
+    asleep_ns: int = 0
+    """CLOCK_BOOTTIME minus CLOCK_MONOTONIC: grows only while this machine is suspended (0 at level sim)."""
 
 
 class TickInput(msgspec.Struct, frozen=True, gc=False):
@@ -267,6 +273,14 @@ class WorkspaceState(msgspec.Struct, frozen=True, gc=False):
     """Corners of the box in order, m, WORLD frame."""
 
 
+class ClockState(msgspec.Struct, frozen=True, gc=False):
+    """What `HostInput.asleep_ns` was in the last tick, once one is known."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/ClockState"
+    asleep_ns: int = 0
+    known: bool = False
+
+
 class SafetyState(msgspec.Struct, frozen=True, gc=False):
     """What safety remembers from tick to tick."""
 
@@ -308,6 +322,7 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     """What was measured then, in the row's unit."""
     first_fault_ns: int = 0
     workspace: WorkspaceState = WorkspaceState()
+    clock: ClockState = ClockState()
     motion: MotionState = MotionState()
 
 

@@ -22,7 +22,8 @@ from safety.travel import Travel
 ZERO = BodyTwist()
 
 FRAME_MAX_AGE_NS = 50_000_000
-"""Five ticks of silence from control latch the gate, and so does a frame that is older than this when it is read."""
+"""Five ticks of silence from control latch the gate, before a frame as well as after it (both may have been frozen
+together), and so does a frame that is older than this when it is read."""
 OWN_PAUSE_NS = 100_000_000
 """A gate process that was paused for longer than this latches when it resumes; control has stopped by then."""
 STEP_MARGIN = 1.2
@@ -54,6 +55,7 @@ class Latch(IntEnum):
     TRAVEL = 14
     MOVING_TIME = 15
     CONTACT_SPEED = 16
+    SUSPENDED = 17
 
 
 LATCH_TEXT = {
@@ -72,6 +74,7 @@ LATCH_TEXT = {
     Latch.EOF_MOVING: "control died while the base was moving",
     Latch.PAUSED: "the gate itself was frozen for more than 100 ms",
     Latch.CONTACT_SPEED: "control sent a velocity at which the contact ball is beyond the envelope",
+    Latch.SUSPENDED: "this machine was suspended, or its clock stood still",
     Latch.TRAVEL: "the base has travelled further than this push can need",
     Latch.MOVING_TIME: "the base has moved for longer than this push can need",
 }
@@ -84,6 +87,7 @@ LATCH_FAULT = {
     Latch.LINK: "F30",
     Latch.PAUSED: "F67",
     Latch.TRAVEL: "F47",
+    Latch.SUSPENDED: "F61",
     Latch.MOVING_TIME: "F48",
 }
 """The row of the fault table for each latch; any other latch is F36, a command that was refused."""
@@ -102,6 +106,8 @@ class GateState(msgspec.Struct, frozen=True, gc=False):
     sent: BodyTwist = ZERO
     sent_ns: int = 0
     overspeed: int = 0
+    said_ns: int = 0
+    """When control sent the last good frame; 0 before the first."""
 
 
 def on_frame(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> GateState:
@@ -111,7 +117,9 @@ def on_frame(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, 
     latch = _judge(limits, state, frame, now_ns)
     if latch or frame is None:
         return latched(state, latch)
-    return GateState(Latch.NONE, frame.seq, frame.tick, now_ns, frame.twist, state.sent, state.sent_ns, state.overspeed)
+    return msgspec.structs.replace(
+        state, seq=frame.seq, tick=frame.tick, frame_ns=now_ns, twist=frame.twist, said_ns=frame.sent_ns
+    )
 
 
 def on_frames(limits: EnvelopeLimits, state: GateState, frames: Sequence[GateFrame | None], now_ns: int) -> GateState:
@@ -184,6 +192,8 @@ def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, no
         return Latch.FROZEN_TICK
     if now_ns - frame.sent_ns > FRAME_MAX_AGE_NS:
         return Latch.STALE
+    if state.said_ns and frame.sent_ns - state.said_ns > FRAME_MAX_AGE_NS:
+        return Latch.SILENCE
     twist = frame.twist
     if not (math.isfinite(twist.vx) and math.isfinite(twist.vy) and math.isfinite(twist.omega)):
         return Latch.NOT_FINITE

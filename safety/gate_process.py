@@ -13,11 +13,13 @@ import gc
 import signal
 import socket
 import sys
+from collections.abc import Callable
+from typing import TypeVar
 
 import msgspec
 from msgspec.structs import astuple, replace
 
-from robot_io.clock import NS_PER_MS, monotonic_ns
+from robot_io.clock import NS_PER_MS, asleep_ns, monotonic_ns
 from robot_io.driver import Base
 from robot_io.errors import PushError
 from robot_io.ipc.event_loop import EventLoop
@@ -36,6 +38,8 @@ from safety.motion_bounds import TravelLimits
 PRIORITY = 82
 CLOCK_NS = 2 * NS_PER_MS
 """How often silence is judged and repeats are sent."""
+MOST_FRAMES = 200
+"""Frames of control read before they are judged: two seconds of them, more than a gate in order ever lets wait."""
 
 
 class GateJob(msgspec.Struct, frozen=True):
@@ -53,6 +57,9 @@ class GateJob(msgspec.Struct, frozen=True):
     status_fd: int
     wall_offset_ns: int
     """Wall clock minus CLOCK_MONOTONIC, for stamps in the log."""
+
+
+JobT = TypeVar("JobT", bound=GateJob)
 
 
 class GateProcess:
@@ -105,11 +112,11 @@ class GateProcess:
             self._loop.stop()
 
     def _read_control(self) -> None:
-        """Read every waiting frame, before silence is judged."""
+        """Read the waiting frames, before silence is judged."""
         began_ns = monotonic_ns()
         frames: list[GateFrame | None] = []
         gone = bool(self._shell.zeros_since_ns)
-        while not gone:
+        while not gone and len(frames) < MOST_FRAMES:
             try:
                 payload = self._control.recv(FRAME_BYTES + 1)
             except BlockingIOError:
@@ -136,7 +143,7 @@ class GateProcess:
 
     def _send_due(self) -> None:
         now_ns = monotonic_ns()
-        self._shell, latching = self._shell.on_leaving(now_ns)
+        self._shell, latching = self._shell.on_asleep(asleep_ns()).on_leaving(now_ns)
         if latching is not None:
             self._log.latched(now_ns, *astuple(latching))
             self._status.say("latched", latch=int(latching.latch), text=latching.text)
@@ -161,12 +168,15 @@ class GateProcess:
         self._record_out.publish(self._shell.record)
 
 
-def main() -> int:
-    """Run the gate; return 0, or the error's exit code when the base could not be opened."""
+def main(kind: type[JobT], wrapped: Callable[[Base, JobT], Base]) -> int:
+    """Run the gate; return 0, or the error's exit code when the base could not be opened.
+
+    kind: the job on stdin. wrapped: makes of the driver what the gate uses, when it has been opened.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # only control's EOF ends the gate
     set_timer_slack_1ns()
-    job = msgspec.json.decode(sys.stdin.buffer.read(), type=GateJob)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=kind)
     status = StatusPipe(job.status_fd)
     try:
         base: Base = build_driver(
@@ -185,7 +195,7 @@ def main() -> int:
     except PushError as error:  # the process ends, which closes everything that was open
         status.error(error)
         return error.exit_code
-    process = GateProcess(job, base, status)
+    process = GateProcess(job, wrapped(base, job), status)
     realtime = try_realtime(PRIORITY)
     status.say("ready", info=msgspec.to_builtins(info), realtime=realtime)
     gc.collect()
@@ -196,4 +206,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(GateJob, lambda base, _job: base))

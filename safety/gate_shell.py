@@ -6,6 +6,7 @@ returns; neither decides anything itself. The order of calls in one turn:
     shell = shell.on_frames(frames, began_ns, now_ns)  # control's frames, before any silence is judged
     shell = shell.on_samples(base.drain())
     shell = shell.on_clock(now_ns, base.health())
+    shell = shell.on_asleep(asleep_ns)                 # before anything leaves
     shell, latching = shell.on_leaving(now_ns)         # log and publish `latching` unless None
     wanted = shell.due(now_ns)                         # send it unless None, then call `on_sent`
 """
@@ -32,6 +33,7 @@ from robot_io.messages import (
     Stamped,
 )
 from safety import gate
+from safety.clock_checks import JUMP_NS
 from safety.envelope import EnvelopeLimits
 from safety.gate import GateState, Latch
 from safety.motion_bounds import TravelLimits
@@ -69,6 +71,8 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
     travel: Travel = Travel()
     record: BaseRecord = BaseRecord()
     """The record of base and gate that control reads."""
+    asleep_ns: int | None = None
+    """How long this machine has been suspended since it was started; None while it is not known."""
     told: Latch = Latch.NONE
     """The latch that has been logged."""
     link_cause: str = ""
@@ -122,6 +126,14 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         if health.state != LinkState.LOST:
             return self if state is self.gate else replace(self, gate=state)
         return replace(self, gate=gate.latched(state, Latch.LINK), link_cause=health.cause)
+
+    def on_asleep(self, asleep_ns: int | None) -> GateShell:
+        """Latch when this machine was suspended since the last look (None: not readable just now, so look again)."""
+        if asleep_ns is None or asleep_ns == self.asleep_ns:
+            return self
+        known = self.asleep_ns is not None and abs(asleep_ns - self.asleep_ns) > JUMP_NS
+        state = gate.latched(self.gate, Latch.SUSPENDED) if known else self.gate
+        return replace(self, gate=state, asleep_ns=asleep_ns)
 
     def on_leaving(self, now_ns: int) -> tuple[GateShell, Latching | None]:
         """Judge the gate's own pause and the way so far; return the latch to be logged now, if there is a new one.

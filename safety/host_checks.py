@@ -11,6 +11,7 @@ from safety.settings import SafetySettings
 LATE_SLOW_TICKS = 3
 LATE_SLOW_NS = 30_000_000
 RECORDER_GONE_NS = 1_000_000_000
+LAUNCHER_HOLD_NS, LAUNCHER_STOP_NS = 500_000_000, 2_000_000_000
 
 
 def check(settings: SafetySettings, state: SafetyState, inp: TickInput) -> tuple[SafetyState, list[str]]:
@@ -23,8 +24,13 @@ def check(settings: SafetySettings, state: SafetyState, inp: TickInput) -> tuple
     if run >= LATE_SLOW_TICKS or host.skipped * settings.period_ns >= LATE_SLOW_NS:
         faults.append(Finding("F60-slow", host.skipped * settings.period_ns / NS_PER_MS))
     gone_ns = 0 if host.recorder_alive else state.recorder_gone_ns or inp.now_ns
-    if gone_ns and inp.now_ns - gone_ns >= RECORDER_GONE_NS:
-        faults.append(Finding("F63", (inp.now_ns - gone_ns) / NS_PER_MS))
+    unrecorded_ns = max(inp.now_ns - gone_ns if gone_ns else 0, host.recorder_silent_ns)
+    if unrecorded_ns >= RECORDER_GONE_NS or host.log_dropped:
+        faults.append(Finding("F63", unrecorded_ns / NS_PER_MS))
     if inp.operator == Operator.STOP:
         faults.append("F64")
+    if host.launcher_silent_ns >= LAUNCHER_STOP_NS:
+        faults.append(Finding("F73-stop", host.launcher_silent_ns / NS_PER_MS))
+    elif host.launcher_silent_ns >= LAUNCHER_HOLD_NS:
+        faults.append(Finding("F73-hold", host.launcher_silent_ns / NS_PER_MS))
     return replace(state, late_run=run, recorder_gone_ns=gone_ns), faults

@@ -17,6 +17,7 @@ from safety import (
     agreement_checks,
     arm_checks,
     base_checks,
+    clock_checks,
     host_checks,
     motion_checks,
     sensor_checks,
@@ -81,6 +82,7 @@ def give_up(state: SafetyState, inp: TickInput) -> tuple[SafetyState, Verdict]:
     latched = tuple(dict.fromkeys([*state.latched, "F68"]))
     mode = max(Mode(state.mode), FAULTS["F68"].mode)
     state = replace(state, mode=int(mode), latched=latched, stop_since_ns=state.stop_since_ns or inp.now_ns)
+    state = _note_first(state, ["F68"], inp.now_ns)
     return state, Verdict(mode, latched, (math.nan,) * len(latched), True, FAULTS["F68"].exit_code)
 
 
@@ -116,6 +118,8 @@ def _gather(
     clamped: bool,
 ) -> tuple[SafetyState, list[str]]:
     state, faults = host_checks.check(settings, state, inp)
+    state, found = clock_checks.check(state, inp)
+    faults += found
     if state.first_ns == 0:
         state = replace(state, first_ns=inp.now_ns)
     faults += task_checks.check(inp, control, wanted, state.first_ns)

@@ -32,6 +32,8 @@ class WorkspaceSettings(msgspec.Struct, frozen=True, gc=False):
     """Half of the base's outline."""
     object_half: float
     """Half of the diagonal of the longest object: it may stand turned."""
+    object_seen: bool
+    """Whether the object's pose is known, in the frame of the base's."""
     approach_m: float
     distance_m: float
     speed: float
@@ -47,6 +49,7 @@ class WorkspaceSettings(msgspec.Struct, frozen=True, gc=False):
             length / 2.0,
             width / 2.0,
             math.sqrt(0.5) * rig.sliders.longest_m,
+            bool(rig.base.topics.slider_pose) and rig.base.pose_source == "mocap",
             rig.path.expected_contact_m,
             rig.control.distance_m,
             max(rig.control.push_speed_m_per_s, rig.control.approach_speed_m_per_s),

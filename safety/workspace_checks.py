@@ -1,7 +1,7 @@
 """Checks that base and object stay where they may be (F55), and before the first motion that the push fits (R06).
 
 All is judged where things would come to rest if this computer died now. The object is judged where its pose is known
-and the rig gives a workspace.
+in the frame of the base's, and the rig gives a workspace.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ def check(
         return state, []
     workspace = settings.workspace
     pose = Pose2D(state.pose_x, state.pose_y, state.pose_yaw)
+    slider = _object_pose(inp) if workspace.given and workspace.object_seen else None
     faults: list[str] = []
     if not state.workspace.known:
         state = replace(state, workspace=_begin(workspace, pose))
-        if workspace.given and (left := room_for_push(workspace, pose, object_pose(inp))) < 0.0:
+        if workspace.given and (left := room_for_push(workspace, pose, slider)) < 0.0:
             faults.append(Finding("R06", left))
     edge = workspace.given or tuple(zip(state.workspace.corners_x, state.workspace.corners_y, strict=True))
     ahead = _ahead(workspace, inp, pose.yaw, (inp.now_ns - state.pose_ns) * 1e-9)
-    slider = object_pose(inp) if workspace.given else None
     left_slow, left_stop = (
         min(_room_of_base(workspace, edge, pose, shifts), _room_of_object(workspace, slider, shifts))
         for shifts in (ahead.slow, ahead.stop)
@@ -67,7 +67,7 @@ def check(
     return state, faults
 
 
-def object_pose(inp: TickInput) -> Pose2D | None:
+def _object_pose(inp: TickInput) -> Pose2D | None:
     """Return where the object is, None where that is not known or too old."""
     base, pose = inp.base, inp.base.object_pose
     fresh = base.object_received_ns > 0 and inp.now_ns - base.object_received_ns <= OBJECT_KNOWN_NS

@@ -60,6 +60,11 @@ COMMANDS = {
     "tune": Command(
         "tools.commands.tune", "recommend gains, with a map of the stable ones", ("push tune", "push tune --json")
     ),
+    "faults": Command(
+        "tools.commands.faults",
+        "the fault table; with --run every row proved",
+        ("push faults", "push faults --run --only F01 --json"),
+    ),
     "emulate": Command(
         "tools.commands.emulate",
         "the wire emulators on their own, until stopped",

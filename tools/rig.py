@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,10 +11,12 @@ from msgspec.structs import replace
 from robot_io.errors import ConfigError
 from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.fault_words import parse_fault
 from robot_io.rig.types import Matrix3
 from tools.kinds import is_shipped, query_kinds
 
 ROTATION_TOLERANCE = 1e-6
+LONGEST_NAME = 64
 
 
 def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
@@ -24,7 +27,8 @@ def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigC
     from safety import limits
 
     rig, problems = _with_kinds(load_rig(name_or_path, overrides), folder_of(name_or_path))
-    problems += _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
+    problems += _name_problems(rig) + _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
+    check_faults(rig)
     if not is_rotation(rig.frames.base_from_sensor):
         problems.append("`frames.base_from_sensor` is not a rotation (orthonormal rows, determinant +1)")
     if problems:
@@ -72,6 +76,32 @@ def devices_at(rig: RigConfig, level: str) -> list[str]:
     return [device for device, its_level in levels.items() if its_level == level]
 
 
+def with_faults(rig: RigConfig, words: Sequence[str]) -> RigConfig:
+    """Return the rig with more faults to inject. Raises ConfigError as `check_faults`."""
+    rig = replace(rig, faults=replace(rig.faults, inject=(*rig.faults.inject, *words)))
+    check_faults(rig)
+    return rig
+
+
+def check_faults(rig: RigConfig) -> None:
+    """Raise ConfigError for a fault to inject that cannot be read, or where a device is real."""
+    for word in rig.faults.inject:
+        parse_fault(word)
+    real = devices_at(rig, "hardware")
+    if rig.faults.inject and real:
+        raise ConfigError(
+            f"no fault is injected where a device is real, and {' and '.join(real)} "
+            f"{'is' if len(real) == 1 else 'are'} at level hardware",
+            where=f"rig {rig.name!r}",
+            do="Inject faults at level sim or emulated",
+        )
+
+
+def faults_of(rig: RigConfig, device: str) -> tuple[str, ...]:
+    """Return the faults to inject into a device: ft, arm or base."""
+    return tuple(word for word in rig.faults.inject if parse_fault(word).device.split(".")[0] == device)
+
+
 def is_rotation(rows: Matrix3) -> bool:
     """Return whether `rows` (3x3) is orthonormal with determinant +1, to 1e-6."""
     x, y, z = rows
@@ -84,6 +114,16 @@ def is_rotation(rows: Matrix3) -> bool:
         x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0]) + x[2] * (y[0] * z[1] - y[1] * z[0])
     )
     return orthonormal and determinant > 0
+
+
+def _name_problems(rig: RigConfig) -> list[str]:
+    """A rig's name becomes part of the names of folders and files."""
+    if re.fullmatch(r"\w[\w .+-]*", rig.name) and len(rig.name) <= LONGEST_NAME:
+        return []
+    return [
+        f"`name` = {rig.name!r} is not a name: letters, digits, spaces and the signs - + . _ are, "
+        f"at most {LONGEST_NAME} of them, the first a letter or a digit"
+    ]
 
 
 def _level_problems(rig: RigConfig) -> list[str]:
@@ -106,6 +146,6 @@ def _address_problems(rig: RigConfig) -> list[str]:
         for key, address in addresses.items()
         if not address and key.split(".")[0] in shipped
     ]
-    if "base" in shipped and rig.base.url and not rig.base.url.startswith("ws://"):
-        problems.append(f"`base.url` = {rig.base.url!r} does not start with ws://")
+    if "base" in shipped and rig.base.url and not rig.base.url.startswith(("ws://", "wss://")):
+        problems.append(f"`base.url` = {rig.base.url!r} does not start with ws:// or wss://")
     return problems

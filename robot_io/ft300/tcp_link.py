@@ -8,6 +8,8 @@ from urllib.parse import urlsplit
 
 from serial.urlhandler import protocol_socket
 
+from robot_io.look_up import addresses_of
+
 CONNECT_TIMEOUT_S = 2.0
 MOST_READS = 16
 SCHEME = "socket://"
@@ -28,10 +30,17 @@ class TcpPort(protocol_socket.Serial):
     _socket: socket.socket  # made by `open`; the type stubs leave it out
 
     def open(self) -> None:
-        """Connect within 2 s. Raises SerialException."""
+        """Connect within 2 s, and 2 s more for a name. Raises DeviceUnreachable (unknown name) or SerialException."""
+        address = str(self.portstr)
+        parts = urlsplit(address)
+        self._address = addresses_of(parts.hostname or "", where=address)[0], parts.port or 0
         # pyserial offers no other way to bound a connection that is neither accepted nor refused.
         protocol_socket.POLL_TIMEOUT = CONNECT_TIMEOUT_S
         super().open()
+
+    def from_url(self, url: str) -> tuple[str, int]:
+        """Return host and port for pyserial, the host as a number: a look-up of its own would have no end."""
+        return self._address
 
     def reset_input_buffer(self) -> None:
         """Discard what has arrived, at most 64 kB (pyserial reads as long as the peer sends). Raises OSError."""

@@ -9,6 +9,7 @@ import contextlib
 import ctypes
 import os
 import resource
+import select
 import signal
 import sys
 from collections.abc import Iterator
@@ -41,6 +42,15 @@ def die_with_parent(parent_pid: int = 0, with_signal: signal.Signals = signal.SI
     now = os.getppid()
     if (parent_pid and now != parent_pid) or (not parent_pid and now == 1):
         os._exit(1)
+
+
+def is_hung_up(read_fd: int) -> bool:
+    """Return whether a pipe has no writer any more; False for -1. Never blocks, reads nothing."""
+    if read_fd < 0:
+        return False
+    poll = select.poll()
+    poll.register(read_fd, 0)  # hang-ups are reported unasked
+    return bool(poll.poll(0))
 
 
 def set_timer_slack_1ns() -> None:

@@ -60,6 +60,16 @@ class Ring:
         """How many records did not fit since the ring was made."""
         return self._counters[_DROPPED]
 
+    @property
+    def consumed(self) -> int:
+        """How many bytes have been popped since the ring was made; it only grows."""
+        return self._counters[_TAIL]
+
+    @property
+    def unread(self) -> int:
+        """How many bytes wait to be popped."""
+        return self._counters[_HEAD] - self._counters[_TAIL]
+
     def push(self, kind: int, time_ns: int, payload: bytes) -> bool:
         """Append a record; False, and one more dropped, when it does not fit. Producer only; never blocks."""
         counters = self._counters

@@ -28,7 +28,7 @@ class LoopTiming(msgspec.Struct, frozen=True, gc=False):
 
 
 class SafetyEvent(msgspec.Struct, frozen=True, gc=False):
-    """A change of mode, or a fault that came or went; `kind` is "mode", "fault" or "cleared"."""
+    """A change of mode, or a fault that came or went; `kind` is "mode", "fault", "cleared" or "injected"."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/SafetyEvent"
     header: Header
@@ -56,6 +56,9 @@ class GateDecision(msgspec.Struct, frozen=True, gc=False):
 
 GATE_SAYS = "gate: "
 """How the text of an event begins that is the gate's own; all others are derived from ticks."""
+
+INJECTED = "injected"
+"""The kind of an event that says that a fault to be injected has changed its first sample."""
 
 LOOP_TIMING = CdrType(LoopTiming, "push_msgs/msg/LoopTiming")
 SAFETY_EVENT = CdrType(SafetyEvent, "push_msgs/msg/SafetyEvent")

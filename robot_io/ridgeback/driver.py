@@ -3,9 +3,9 @@
 One thread, never blocking after `start`: call `drain` when `fileno()` is readable and at least every 20 ms.
 What the bridge gets wrong is handled here: it never reports an error (checked beforehand by
 `preflight`, and by hearing our own commands back), it delivers old commands after a hang (nothing
-that moves is sent on a quiet link; a link that is quiet, or echoes none of our commands, for 0.3 s is reset,
-never closed in peace, never reopened), and it forwards NaN, which the base takes for full speed backwards (refused).
-The base itself stops 0.25 s after the last command.
+that moves is sent on a quiet link; one that is quiet, or echoes none of our commands, for 0.3 s is given up for good
+and gets nothing but zeros, which are then delivered behind what moved), and it forwards NaN, which the base takes for
+full speed backwards (refused). The base itself stops 0.25 s after the last command.
 """
 
 from __future__ import annotations
@@ -26,18 +26,20 @@ from robot_io.messages import (
     Pose2D,
     Stamped,
 )
+from robot_io.ridgeback.echo_watch import EchoWatch
 from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
+from robot_io.ridgeback.intake import Intake
+from robot_io.ridgeback.open_socket import parse_url
 from robot_io.ridgeback.pending import PendingSamples
 from robot_io.ridgeback.preflight import check_topics
 from robot_io.ridgeback.rosbridge_codec import (
-    Published,
-    decode_frame,
+    check_finite,
     encode_advertise,
     encode_subscribe,
     encode_twist,
     spell_type,
 )
-from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink, parse_url
+from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink
 from robot_io.rig.topics import TopicsConfig
 
 PoseSource = Literal["mocap", "odometry", "joint_states"]
@@ -45,7 +47,9 @@ PoseSource = Literal["mocap", "odometry", "joint_states"]
 FRESH_NS = 100 * NS_PER_MS
 """Nothing that moves is sent when the newest message from the bridge is older than this."""
 LINK_STALE_NS = 300 * NS_PER_MS
-"""The link is reset when the newest message from the bridge is older than this, or a command not heard back since."""
+"""The link is given up when nothing has come from the bridge for this long, or no command of ours was heard back."""
+BACKLOG_NS = 200 * NS_PER_MS
+"""The link is reset when more waits than can be read, for longer than this."""
 PING_PERIOD_NS = 100 * NS_PER_MS
 FIRST_MESSAGE_TIMEOUT_S = 2.0
 
@@ -55,7 +59,7 @@ ZERO = BodyTwist()
 class Ridgeback(DriverBase):
     """A Ridgeback behind rosbridge: takes velocities (m/s, rad/s, BODY frame), gives pose, odometry and status.
 
-    url: `ws://host:port` of the bridge; `wss` is not supported.
+    url: `ws://host:port` of the bridge, or `wss://...` for an encrypted one, whose certificate is checked.
     topics: names and types of the base's ROS topics.
     pose_source: which topic says where the base is: `"mocap"`, `"odometry"` or `"joint_states"`.
     base_from_marker: x (m), y (m), yaw (rad) of the motion capture's marker frame in the BODY frame.
@@ -92,8 +96,9 @@ class Ridgeback(DriverBase):
         self._state = LinkState.CLOSED
         self._cause = ""
         self._pending = PendingSamples()
+        self._intake = Intake(self._reader, clock)
         self._last_ping_ns = 0
-        self._unheard_ns = 0  # when the oldest command left that may not have been heard back; 0 when there is none
+        self._echoes = EchoWatch()
         self._started = False
         self.newest_inbound_ns = 0
         """When the newest message of any topic arrived; 0 before the first."""
@@ -101,9 +106,7 @@ class Ridgeback(DriverBase):
         """When the bridge last answered a ping (proves its I/O only); 0 before the first."""
         self.sent_ns = 0
         """When the last command left."""
-        self._counters = dict.fromkeys(
-            ("messages", "undecodable", "sent", "held_back", "unanswered_checks", "pings"), 0
-        )
+        self._counters = dict.fromkeys(("sent", "held_back", "unanswered_checks", "pings"), 0)
 
     @classmethod
     def from_rig(cls, address: str, options: Mapping[str, Any]) -> Self:
@@ -114,10 +117,11 @@ class Ridgeback(DriverBase):
         return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
-        """Connect, check topics, advertise, subscribe; at most 3.5 s. Nothing is commanded.
+        """Connect, check topics, advertise, subscribe; at most 6 s. Nothing is commanded.
 
-        Raises DeviceUnreachable (nothing listens, no handshake, the link broke), DeviceProtocolError (no bridge, wrong
-        message type) or DeviceNotReady (nobody listens to the command topic).
+        Raises DeviceUnreachable (unknown name, nothing listens, no handshake, the link broke), DeviceProtocolError (no
+        bridge, a certificate that is not trusted, wrong message type) or DeviceNotReady (nobody listens to the
+        command topic).
         """
         self.close()
         self._reset()
@@ -169,6 +173,7 @@ class Ridgeback(DriverBase):
         """Return every new sample, oldest first (`seq` counts per kind); also keeps the link alive and judged.
 
         At most 4096; older ones are dropped and counted. Never blocks, never raises; call it at least every 20 ms.
+        Takes in at most 200 messages, and about 2 ms of processor time: the rest waits for the next call.
         """
         now_ns = self._clock()  # before looking: what waited while this process was paused is not silence
         self._receive()
@@ -178,22 +183,25 @@ class Ridgeback(DriverBase):
     def command(self, wanted: BodyTwist) -> BodyTwist:
         """Send a velocity (m/s, m/s, rad/s, BODY frame); return what was really sent.
 
-        Zero is sent instead when the link has been quiet for 0.1 s, and zero is returned when nothing could be sent
-        (`health` says why): the base then stops by its own timeout. That is 0.25 s after the last command, so a motion
-        lasts only as long as commands do. Never blocks. Raises ValueError unless finite.
+        Zero is sent instead when the link has been quiet for 0.1 s or is given up, and zero is returned when nothing
+        could be sent (`health` says why): the base then stops by its own timeout. That is 0.25 s after the last
+        command, so a motion lasts only as long as commands do. Never blocks. Raises ValueError unless finite.
         """
-        payload = encode_twist(self._topic, self._type, wanted)
+        check_finite(wanted)
         now_ns = self._clock()
         if now_ns - self.newest_inbound_ns > FRESH_NS:
             self._receive()  # perhaps only nobody has drained
         self._tend(now_ns)
-        if not self._started or self._link is None:
+        if self._link is None:
+            return ZERO
+        if not self._started:
+            if self._state == LinkState.LOST:  # what may still be delivered late must be followed by zero
+                self._send(ZERO)
             return ZERO
         if wanted != ZERO and now_ns - self.newest_inbound_ns > FRESH_NS:
             self._counters["held_back"] += 1
             wanted = ZERO
-            payload = encode_twist(self._topic, self._type, ZERO)
-        return wanted if self._send(payload) else ZERO
+        return wanted if self._send(wanted) else ZERO
 
     def health(self) -> DeviceHealth:
         """Return link state, cause and counters; the rate (Hz) is that of the last 100 poses.
@@ -201,14 +209,19 @@ class Ridgeback(DriverBase):
         Counters since `open`: `messages`, `undecodable`, `sent`, `held_back` (motion turned into zero on a quiet link),
         `dropped_samples`, `unanswered_checks`, `pings`, and one for each kind of sample.
         """
-        counters = {**self._counters, "dropped_samples": self._pending.dropped, **self._reader.counters}
+        counters = {
+            **self._intake.counters,
+            **self._counters,
+            "dropped_samples": self._pending.dropped,
+            **self._reader.counters,
+        }
         return DeviceHealth(self._state, self._cause, counters, self._pending.pose_rate_hz())
 
     def stop(self) -> None:
         """Send zero three times, if the link is up. Never blocks, never raises."""
         for _ in range(3):
             if self._link is not None:
-                self._send(encode_twist(self._topic, self._type, ZERO))
+                self._send(ZERO)
 
     def close(self) -> None:
         """Close the connection within 0.05 s; the bridge forgets us by itself. Idempotent, never raises."""
@@ -222,43 +235,39 @@ class Ridgeback(DriverBase):
     def _reset(self) -> None:
         self._cause = ""
         self._pending.clear()
-        self._reader.reset()
+        self._intake.reset()
         self.newest_inbound_ns = self.newest_pong_ns = self.sent_ns = self._last_ping_ns = 0
-        self._unheard_ns = 0
+        self._echoes = EchoWatch()
         self._counters = dict.fromkeys(self._counters, 0)
 
     def _receive(self) -> None:
-        if self._link is None:
+        link = self._link
+        if link is None:
             return
         try:
-            texts = self._link.receive()
+            samples = self._intake.take(link)
         except LinkLost as lost:
             self._give_up(str(lost))
             return
-        self.newest_pong_ns = self._link.newest_pong_ns
-        for text, received_ns in texts:
-            self._counters["messages"] += 1
-            try:
-                frame = decode_frame(text)
-                if not isinstance(frame, Published):
-                    continue
-                self.newest_inbound_ns = received_ns
-                samples = self._reader.read(frame, received_ns)
-            except ValueError:
-                self._counters["undecodable"] += 1
-                continue
-            for sample in samples:
-                if isinstance(sample.value, CommandEcho):
-                    self._unheard_ns = 0
-                self._pending.add(sample)
+        if self._state == LinkState.LOST:  # given up: nothing more is believed
+            return
+        self.newest_inbound_ns = max(self.newest_inbound_ns, self._intake.newest_inbound_ns)
+        self.newest_pong_ns = link.newest_pong_ns
+        for sample in samples:
+            if isinstance(sample.value, CommandEcho):
+                self._echoes.on_heard(sample.value.twist)
+            self._pending.add(sample)
 
     def _tend(self, now_ns: int) -> None:
         if self._link is None or not self._started:
             return
         if now_ns - self.newest_inbound_ns > LINK_STALE_NS:
-            self._give_up(f"no message from the bridge for {LINK_STALE_NS / NS_PER_S:g} s")
-        elif self._unheard_ns and now_ns - self._unheard_ns > LINK_STALE_NS:  # they are queued somewhere, or discarded
-            self._give_up(f"the bridge echoed none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
+            self._stop_believing(f"no message from the bridge for {LINK_STALE_NS / NS_PER_S:g} s")
+        elif self._intake.behind_since_ns and now_ns - self._intake.behind_since_ns > BACKLOG_NS:
+            self.stop()
+            self._give_up(f"the bridge has sent more than can be read for {BACKLOG_NS / NS_PER_S:g} s")
+        elif (since_ns := self._echoes.unheard_since_ns) and now_ns - since_ns > LINK_STALE_NS:  # queued, or discarded
+            self._stop_believing(f"the bridge echoed none of our commands for {LINK_STALE_NS / NS_PER_S:g} s")
         elif now_ns - self._last_ping_ns >= PING_PERIOD_NS:
             self._last_ping_ns = now_ns
             self._counters["pings"] += 1
@@ -267,7 +276,8 @@ class Ridgeback(DriverBase):
             except LinkLost as lost:
                 self._give_up(str(lost))
 
-    def _send(self, payload: bytes) -> bool:
+    def _send(self, twist: BodyTwist) -> bool:
+        payload = encode_twist(self._topic, self._type, twist)
         if self._link is None:
             return False
         try:
@@ -276,20 +286,31 @@ class Ridgeback(DriverBase):
             self._give_up(str(lost))
             return False
         self.sent_ns = self._clock()
-        if self._reader.counters["echo"] and not self._unheard_ns:  # before the first, ROS may still be connecting
-            self._unheard_ns = self.sent_ns
+        self._echoes.on_sent(twist, self.sent_ns)
         self._counters["sent"] += 1
         return True
 
+    def _stop_believing(self, cause: str) -> None:
+        """Give the link up, but keep its connection for zeros.
+
+        A bridge that hangs has commands in hand or in its queue, and delivers at least one of them when it goes on. A
+        reset would throw away the zeros behind them, and the base would move once more until its own timeout.
+        """
+        self._started = False
+        self._pending.clear()
+        self._state = LinkState.LOST
+        self._cause = cause
+
     def _give_up(self, cause: str) -> None:
-        """Reset the connection, so that nothing still on its way is delivered later; never reopened from here."""
+        """Reset a connection that is broken or floods us; never reopened from here."""
         link, self._link = self._link, None
         self._started = False
         if link is not None:
             self._announce(link)
             link.abort()
+        if self._state != LinkState.LOST:  # the first cause stays
+            self._cause = cause
         self._state = LinkState.LOST
-        self._cause = cause
 
     def _announce(self, link: WebSocketLink) -> None:
         if self.before_close is not None:

@@ -77,14 +77,19 @@ def encode_call(call_id: str, service: str, arguments: dict[str, str]) -> bytes:
     return _json({"op": "call_service", "id": call_id, "service": service, "args": arguments})
 
 
+def check_finite(twist: BodyTwist) -> None:
+    """Raise ValueError unless all three numbers are finite: the base would take NaN for full speed backwards."""
+    if not (math.isfinite(twist.vx) and math.isfinite(twist.vy) and math.isfinite(twist.omega)):
+        raise ValueError(f"a velocity must be finite, got {twist}")
+
+
 def encode_twist(topic: str, type_name: str, twist: BodyTwist) -> bytes:
     """Publish a velocity. Raises ValueError unless all three numbers are finite.
 
     The stamped form leaves the stamp out of its header: the bridge then fills in the robot's own time (ROS 2
     does so only when there is a header at all), so that the two clocks need not agree.
     """
-    if not (math.isfinite(twist.vx) and math.isfinite(twist.vy) and math.isfinite(twist.omega)):
-        raise ValueError(f"a velocity must be finite, got {twist}")
+    check_finite(twist)
     message: dict[str, object] = {
         "linear": {"x": float(twist.vx), "y": float(twist.vy), "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": float(twist.omega)},

@@ -1,8 +1,8 @@
 """One websocket connection without a thread and without blocking: the Sans-I/O client of `websockets` on a socket.
 
 Made for commands to a robot: a message leaves whole and now, or the link counts as lost. Nothing queues in
-front of it, nothing is resumed, and a lost link is reset (SO_LINGER 0), so that the kernel does not deliver
-the rest later. Only `connect` waits, bounded.
+front of it, and nothing is resumed. Reading is bounded, too: a flood of messages cannot hold its reader for longer
+than READ_NS. Only `connect` waits, bounded.
 """
 
 from __future__ import annotations
@@ -10,56 +10,54 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
+import ssl
 import struct
+import time
 
 from websockets.client import ClientProtocol
-from websockets.exceptions import InvalidHandshake, InvalidMessage, InvalidURI
+from websockets.exceptions import InvalidHandshake, InvalidMessage
 from websockets.frames import Frame, Opcode
 from websockets.http11 import Response
 from websockets.protocol import State
-from websockets.uri import WebSocketURI, parse_uri
 
-from robot_io.clock import NS_PER_S, ClockNs, monotonic_ns
-from robot_io.errors import ConfigError, DeviceError, DeviceProtocolError, DeviceUnreachable
+from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
+from robot_io.errors import DeviceError, DeviceProtocolError, DeviceUnreachable
+from robot_io.ridgeback.open_socket import START_THE_BRIDGE, open_socket, parse_url
 
-CONNECT_TIMEOUT_S = 1.0
 HANDSHAKE_TIMEOUT_S = 1.0
 CLOSE_TIMEOUT_S = 0.05
 SEND_BUFFER_BYTES = 16_384
 """Small: what does not fit into it is old before it arrives."""
 
+MOST_FRAMES = 200
+"""Frames read in one call ..."""
+READ_NS = 2 * NS_PER_MS
+"""... and processor time of this thread that it may take."""
+WOULD_BLOCK = (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError)
+"""What a socket raises instead of waiting, plain or encrypted."""
+
 _RECEIVE_BYTES = 65_536
-_RECEIVES_PER_CALL = 16
+_PARSED_BYTES = 256
+"""Parsed between two looks at the bounds: at most 128 frames of two bytes, about a millisecond."""
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)
-_START_THE_BRIDGE = "Start rosbridge on the robot (roslaunch rosbridge_server rosbridge_websocket.launch)"
 
 
 class LinkLost(Exception):
     """The connection is gone or must be given up; the message is the cause."""
 
 
-def parse_url(url: str) -> WebSocketURI:
-    """Return the parts of `ws://host:port/`. Raises ConfigError for anything else."""
-    try:
-        uri = parse_uri(url)
-        uri.host.encode("idna")  # as looking it up does
-    except (InvalidURI, ValueError) as error:
-        raise ConfigError(
-            f"{url!r} is not a websocket address", where="base url", do="Write it as ws://192.168.131.1:9090"
-        ) from error
-    if uri.secure:
-        raise ConfigError("encrypted websockets (wss) are not supported", where=url, do="Use ws://")
-    return uri
-
-
 class WebSocketLink:
-    """A connected websocket; every method returns at once except `connect` (2 s) and `close` (0.05 s)."""
+    """A connected websocket; every method returns at once except `connect` (5 s) and `close` (0.05 s)."""
 
     def __init__(self, sock: socket.socket, protocol: ClientProtocol, clock: ClockNs) -> None:
         self._socket = sock
         self._protocol = protocol
         self._clock = clock
         self._parts: list[bytes] | None = None
+        self._unparsed = memoryview(b"")
+        self._unparsed_ns = 0
+        self.behind = False
+        """Whether the last `receive` left something unread because its bounds were reached."""
         self._lost: LinkLost | None = None
         self.newest_pong_ns = 0
         """When the server last answered a ping; 0 before the first answer."""
@@ -70,17 +68,7 @@ class WebSocketLink:
     def connect(cls, url: str, clock: ClockNs = monotonic_ns) -> WebSocketLink:
         """Connect and shake hands. Raises ConfigError, DeviceUnreachable or DeviceProtocolError."""
         uri = parse_url(url)
-        try:
-            sock = socket.create_connection((uri.host, uri.port), timeout=CONNECT_TIMEOUT_S)
-        except TimeoutError as error:
-            raise DeviceUnreachable(
-                f"no answer within {CONNECT_TIMEOUT_S:g} s",
-                where=url,
-                do="Check cable, address and that the base is on",
-            ) from error
-        except OSError as error:
-            why = error.strerror or str(error)
-            raise DeviceUnreachable(f"cannot connect ({why})", where=url, do=_START_THE_BRIDGE) from error
+        sock = open_socket(uri, url)
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
@@ -99,14 +87,17 @@ class WebSocketLink:
     def receive(self) -> list[tuple[bytes, int]]:
         """Return the texts that have arrived, each with its arrival time (ns); pings are answered on the way.
 
-        Raises LinkLost on EOF, error or a broken frame, after everything that came before it was returned.
+        At most about MOST_FRAMES, within READ_NS; `behind` tells whether more may wait. Raises LinkLost on EOF, error
+        or a broken frame, after everything that came before it was returned.
         """
         texts: list[tuple[bytes, int]] = []
         self._raise_if_lost()
+        frames, until_ns = 0, time.thread_time_ns() + READ_NS
+        self.behind = False
         try:
-            for _ in range(_RECEIVES_PER_CALL):
-                if not self._receive_once(texts):
-                    break
+            while not self.behind and self._read_more():
+                frames += self._parse(texts)
+                self.behind = frames >= MOST_FRAMES or time.thread_time_ns() > until_ns
         except LinkLost as lost:
             self._lost = lost
             if not texts:
@@ -128,6 +119,8 @@ class WebSocketLink:
     def wait_readable(self, until_ns: int) -> bool:
         """Wait until something arrives; False once `until_ns` has passed, however much still comes."""
         left_ns = until_ns - self._clock()
+        if left_ns > 0 and isinstance(self._socket, ssl.SSLSocket) and self._socket.pending():
+            return True  # decrypted already: the descriptor does not show it
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
         return left_ns > 0 and bool(poll.poll(left_ns // 1_000_000))
@@ -162,14 +155,17 @@ class WebSocketLink:
                         where=url,
                         do="The bridge hangs, or something else is listening there; restart rosbridge",
                     )
-                data = self._socket.recv(_RECEIVE_BYTES)
+                try:
+                    data = self._socket.recv(_RECEIVE_BYTES)
+                except WOULD_BLOCK:  # part of an encrypted record
+                    continue
                 if data:
                     self._protocol.receive_data(data)
                 else:
                     self._protocol.receive_eof()
         except (OSError, LinkLost) as error:
             raise DeviceUnreachable(
-                f"connection lost during the handshake ({error})", where=url, do=_START_THE_BRIDGE
+                f"connection lost during the handshake ({error})", where=url, do=START_THE_BRIDGE
             ) from error
         if self._protocol.handshake_exc is not None:
             raise _not_a_bridge(url, self._protocol.handshake_exc) from self._protocol.handshake_exc
@@ -177,24 +173,32 @@ class WebSocketLink:
         if isinstance(response, Response):
             self.server = response.headers.get("Server", "")
 
-    def _receive_once(self, texts: list[tuple[bytes, int]]) -> bool:
+    def _read_more(self) -> bool:
+        """Return whether there are bytes to parse, after a look into the socket where there were none."""
+        if self._unparsed:
+            return True
         try:
             data = self._socket.recv(_RECEIVE_BYTES)
-        except BlockingIOError:
+        except WOULD_BLOCK:
             return False
         except OSError as error:
             raise LinkLost(f"connection lost ({error.strerror or error})") from error
-        now_ns = self._clock()
+        self._unparsed, self._unparsed_ns = memoryview(data), self._clock()
         # Acknowledge at once, or the server's Nagle algorithm holds its next message back for up to 40 ms.
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         if not data:
             raise LinkLost("connection closed by the bridge")
-        self._protocol.receive_data(data)
-        self._collect(texts, now_ns)
+        return True
+
+    def _parse(self, texts: list[tuple[bytes, int]]) -> int:
+        """Parse the next few bytes, append the texts in them, and return how many frames they ended."""
+        part, self._unparsed = self._unparsed[:_PARSED_BYTES], self._unparsed[_PARSED_BYTES:]
+        self._protocol.receive_data(bytes(part))
+        frames = self._collect(texts, self._unparsed_ns)
         self._flush()
         if self._protocol.state is not State.OPEN:
             raise LinkLost(self._why_closed())
-        return True
+        return frames
 
     def _why_closed(self) -> str:
         goodbye = self._protocol.close_rcvd
@@ -208,8 +212,9 @@ class WebSocketLink:
         if self._protocol.state is not State.OPEN:  # its goodbye came together with its handshake
             raise LinkLost(self._why_closed())
 
-    def _collect(self, texts: list[tuple[bytes, int]], now_ns: int) -> None:
-        for event in self._protocol.events_received():
+    def _collect(self, texts: list[tuple[bytes, int]], now_ns: int) -> int:
+        events = self._protocol.events_received()
+        for event in events:
             if not isinstance(event, Frame):
                 continue
             if event.opcode is Opcode.PONG:
@@ -223,6 +228,7 @@ class WebSocketLink:
                 if event.fin:
                     texts.append((b"".join(self._parts), now_ns))
                     self._parts = None
+        return len(events)
 
     def _flush(self) -> None:
         data = b"".join(self._protocol.data_to_send())
@@ -230,7 +236,7 @@ class WebSocketLink:
             return
         try:
             sent = self._socket.send(data)
-        except BlockingIOError as error:
+        except WOULD_BLOCK as error:
             raise LinkLost("the socket accepts no more data: the bridge is not reading") from error
         except OSError as error:
             raise LinkLost(f"sending failed ({error.strerror or error})") from error

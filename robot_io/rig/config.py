@@ -91,6 +91,8 @@ class BaseConfig(Table, frozen=True):
     """A shipped kind, or `package.module:Class`."""
     level: Level = "emulated"
     url: str = ""
+    """`ws://host:port` of rosbridge, or `wss://host:port`: then its certificate is checked against the system's store,
+    or the file that the environment variable SSL_CERT_FILE names."""
     pose_source: Literal["mocap", "odometry", "joint_states"] = "mocap"
     """`mocap`: topic `base_pose`; `odometry`: counted from where the run starts; `joint_states`: as it says."""
     pose_rate_hz: Annotated[float, Meta(ge=5, le=500)] = 100.0
@@ -191,6 +193,13 @@ class LimitsConfig(Table, frozen=True):
     """... and at which it stops (F20)."""
 
 
+class FaultsConfig(Table, frozen=True):
+    """Faults to inject at levels sim and emulated, for rehearsals and tests (docs/faults.md)."""
+
+    inject: tuple[str, ...] = ()
+    """Each `DEVICE.KIND[=VALUE] at T s [for T s]`, as after `push run --fault`."""
+
+
 class RigConfig(Table, frozen=True):
     """One robot, real or not: its devices, frames, path, gains, limits and, where simulated, its world."""
 
@@ -208,6 +217,7 @@ class RigConfig(Table, frozen=True):
     workspace: WorkspaceConfig = WorkspaceConfig()
     goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
+    faults: FaultsConfig = FaultsConfig()
 
 
 def shipped_rigs() -> list[str]:

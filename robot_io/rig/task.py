@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from robot_io.polygon import Polygon, flaw
-from robot_io.rig.types import InRoom, Positive, Table
+from robot_io.rig.types import InRoom, Table
 
 
 class WorkspaceConfig(Table, frozen=True):
@@ -51,9 +51,9 @@ class WorkspaceConfig(Table, frozen=True):
 
 
 class GoalConfig(Table, frozen=True):
-    """How well the line must be kept for `done`; nothing here stops the base."""
+    """Where the contact ball has to be for a push to count as done. It decides the verdict and never stops the base."""
 
-    corridor_m: Positive = 0.5
-    """How far beside the path the contact ball may be during the push (the paper's corridor)."""
-    end_tolerance_m: Positive = 0.3
-    """How far beside the path it may be at the end, or the start's own offset where that is larger."""
+    corridor_m: Annotated[float, Meta(gt=0, le=10)] = 0.5
+    """How far the ball may be from the path at any time of the push, to either side."""
+    end_tolerance_m: Annotated[float, Meta(gt=0, le=10)] = 0.3
+    """How far it may be at the end. A push that starts further off may end as far off as it started."""

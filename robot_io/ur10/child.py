@@ -16,12 +16,14 @@ import time
 from typing import NoReturn
 
 import msgspec
+from msgspec.structs import replace
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable, PushError
 from robot_io.ipc.process import (
     die_with_parent,
     forbid_new_descriptors,
+    is_hung_up,
     lock_memory,
     set_timer_slack_1ns,
     starting_threads_at,
@@ -29,6 +31,7 @@ from robot_io.ipc.process import (
 )
 from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.ipc.status import StatusPipe
+from robot_io.look_up import addresses_of
 from robot_io.messages import ArmError, ArmRecord, LinkState
 from robot_io.ur10.job import ArmJob
 from robot_io.ur10.preflight import preflight
@@ -81,10 +84,13 @@ class ArmProcess:
         self._publish(monotonic_ns(), LinkState.UP, reader.error)
 
     def run(self) -> None:
-        """Publish until SIGTERM; then end cleanly. Raises DeviceError when the link or the holding is lost."""
+        """Publish until SIGTERM or the end of the run; then end cleanly.
+
+        Raises DeviceError when the link or the holding is lost.
+        """
         deadline_ns = monotonic_ns()
         command_ns = deadline_ns
-        while not self._ending.asked:
+        while not (self._ending.asked or is_hung_up(self._job.run_fd)):
             now_ns = monotonic_ns()
             fresh = self._reader.poll(now_ns)
             error = self._reader.error
@@ -130,6 +136,7 @@ def _sleep_until_next(deadline_ns: int) -> int:
 
 def hold_arm(job: ArmJob, record: TypedRecord[ArmRecord], status: StatusPipe) -> NoReturn:
     """Connect, report ready, publish until told to end; then end this process. Raises DeviceError."""
+    job = replace(job, host=addresses_of(job.host, where=job.host)[0])  # the wheel would look it up without a deadline
     info = preflight(job.host)
     threads_priority = RECEIVER_PRIORITY if job.realtime_priority > 0 else 0
     with starting_threads_at(threads_priority):

@@ -30,14 +30,16 @@ from robot_io.messages import (
 )
 from robot_io.ur10.job import ArmJob, Hold
 
-START_WITHIN_S: dict[Hold, float] = {"monitor": 5.0, "servo": 8.0}
-"""From spawn to ready. The wheel itself waits 5 s for its control script before it says why."""
+START_WITHIN_S: dict[Hold, float] = {"monitor": 7.0, "servo": 10.0}
+"""From spawn to ready, 2 s of it for looking up a name. The wheel itself waits 5 s for its control script before it
+says why."""
 STOP_WITHIN_S = 3.0
 
 
 def spawn_arm(job: ArmJob) -> Child:
     """Start the arm's process; it is ready within START_WITHIN_S, dies with the calling thread, ends on SIGTERM."""
-    return spawn("arm", "robot_io.ur10.child", job, [job.record_fd])
+    fds = [job.record_fd] if job.run_fd < 0 else [job.record_fd, job.run_fd]
+    return spawn("arm", "robot_io.ur10.child", job, fds)
 
 
 class ArmLink:
@@ -104,7 +106,7 @@ class Ur10(DriverBase):
         return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
-        """Start the arm's process and wait until it has published; at most 5 s, `servo` 8 s.
+        """Start the arm's process and wait until it has published; at most 7 s, `servo` 10 s.
 
         Raises DeviceUnreachable (no answer, no packets, not ready in time), DeviceProtocolError (no UR10, another
         PolyScope), DeviceNotReady (off, stopped by safety; for `servo` also moving, playing a program or elsewhere) or

@@ -28,3 +28,5 @@ class ArmJob(msgspec.Struct, frozen=True):
     held_pose_tolerance_rad: float = 0.05
     status_fd: int = -1
     realtime_priority: int = DEFAULT_PRIORITY
+    run_fd: int = -1
+    """The process also ends when this pipe has no writer any more; -1: no pipe."""

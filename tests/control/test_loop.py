@@ -40,7 +40,7 @@ def bench():
         sensor=sensor,
         arm=SimpleNamespace(read=lambda: None),
         base=SimpleNamespace(alive=True, read=lambda: None),
-        ring=SimpleNamespace(dropped=0),
+        ring=SimpleNamespace(dropped=0, consumed=0, unread=0),
         watch=Watch(),
         operator_fd=heard,
         on_status=lambda *_: None,
@@ -126,3 +126,64 @@ def test_the_gate_is_alive_while_its_link_and_its_process_are(bench, alive, gone
     bench.loop._base.alive = alive
     bench.loop._watch.gone.update(gone)
     assert bench.loop._input(0, 0, 0).host.gate_alive is seen
+
+
+def silences(bench, *steps):
+    """Let ticks of 10 ms pass and return what each says of launcher and recorder, in ms.
+
+    Each step is (late by ms, bytes from the launcher, bytes consumed, bytes unread).
+    """
+    loop, now_ns = bench.loop, [5_000_000_000]
+    loop._clock = lambda: now_ns[0]
+    loop._launcher.heard(now_ns[0])
+    loop._recorder.heard(now_ns[0])
+    seen = []
+    loop._one_tick = lambda inp: seen.append((inp.host.launcher_silent_ns / 1e6, inp.host.recorder_silent_ns / 1e6))
+    deadline_ns = now_ns[0]
+    for late_ms, typed, consumed, unread in steps:
+        now_ns[0] = deadline_ns + round(late_ms * 1e6)
+        os.write(bench.told, typed)
+        loop._ring.consumed, loop._ring.unread = consumed, unread
+        loop._on_deadline(deadline_ns)
+        deadline_ns = loop._timer.deadline_ns
+        loop._timer.cancel()
+    return seen
+
+
+def test_the_launcher_is_silent_since_its_last_byte(bench):
+    beats = (b"", b"", b"H", b"", b"HH", b"", b"R")
+    assert [launcher for launcher, _ in silences(bench, *((0, beat, 0, 0) for beat in beats))] == [
+        0,
+        10,
+        0,
+        10,
+        0,
+        10,
+        0,
+    ]
+
+
+def test_the_recorder_is_silent_while_records_wait_and_it_takes_none(bench):
+    steps = [
+        (0, b"", 100, 0),
+        (0, b"", 100, 50),
+        (0, b"", 100, 90),
+        (0, b"", 150, 90),
+        (0, b"", 150, 99),
+        (0, b"", 150, 0),
+    ]
+    assert [recorder for _, recorder in silences(bench, *steps)] == [0, 10, 20, 0, 10, 0]
+
+
+def test_a_pause_of_the_loop_itself_is_nobodys_silence(bench):
+    steps = [(0, b"", 100, 50), (0, b"", 100, 50), (300, b"", 100, 50), (0, b"", 100, 50)]
+    assert silences(bench, *steps) == [(0, 0), (10, 10), (20, 20), (30, 30)]
+
+
+def test_a_launcher_that_is_gone_is_read_no_more(bench):
+    bench.loop._loop.add_fd(bench.loop._operator_fd, bench.loop._on_operator)
+    os.close(bench.told)
+    bench.told = -1
+    bench.loop._on_operator(0)
+    bench.loop._on_operator(0)
+    assert bench.loop._input(0, 0, 0).operator == Operator.STOP

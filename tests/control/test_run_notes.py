@@ -18,7 +18,7 @@ def noted(*ticks):
     bench.fold()
     for k, (mode, faults) in enumerate(ticks):
         inp = replace(bench.inp, tick=100 + k, now_ns=bench.inp.now_ns + k * PERIOD_NS)
-        notes.note(inp, replace(bench.output, mode=int(mode), faults=faults))
+        notes.note(inp, bench.state, replace(bench.output, mode=int(mode), faults=faults))
     return notes
 
 

@@ -137,6 +137,78 @@ def test_recorder_killed(state, tmp_path, host):
     assert lost_ms < 300.0, "it flushes every 250 ms what it drains every 20 ms"
 
 
+def wait_for_only(run, pids, left, within_s):
+    """Wait until no process of a run but `left` lives."""
+    deadline_s = time.monotonic() + within_s
+    while others := {name for name, pid in pids.items() if pid in run.alive() and name != left}:
+        assert time.monotonic() < deadline_s, f"still alive: {others}"
+        time.sleep(0.05)
+
+
+@repeated_when_the_host_stalls
+def test_launcher_frozen(state, tmp_path, host):
+    """Nobody holds the operator's keys: held after 0.5 s, stopped after 2 s; 5 s after that only the frozen one is."""
+    with pushing(state, tmp_path / "run", host) as (run, pids):
+        frozen_ns = time.monotonic_ns()
+        run.signal(STOP)
+        wait_for_only(run, pids, "launcher", 2.0 + 1.5 + 5.0)
+        run.signal(signal.SIGCONT)
+        ended = run.wait(10.0)
+        run.wait_gone(3.0)
+    assert ended.code == 5, ended.err
+    assert ended.last_object["faults"] == ["F73-stop"]
+    assert ended.last_object["fault_counts"]["F73-hold"] == 1
+    log = tmp_path / "run" / "run.mcap"
+    ticks = [TICK_CDR.decode(message.payload) for message in messages(log, "/control/tick")]
+    first = {row: next(t.input.now_ns for t in ticks if row in t.output.faults) for row in ("F73-hold", "F73-stop")}
+    # The last sign of life came up to 0.1 s before the freeze.
+    assert 390.0 < (first["F73-hold"] - frozen_ns) / 1e6 < 530.0
+    assert 1890.0 < (first["F73-stop"] - frozen_ns) / 1e6 < 2030.0
+    assert stands(world_of(log)[1][-1][1])
+    replays(tmp_path / "run")
+
+
+@repeated_when_the_host_stalls
+def test_launcher_frozen_for_a_moment(state, tmp_path, host):
+    """The base holds and goes on by itself."""
+    argv = ("run", "emulated", *QUICK, "--distance-m", "0.5", "--out", str(tmp_path / "run"), "--json")
+    with started(state, *argv, host=host) as run:
+        run.wait_for("PUSH ")
+        run.signal(STOP)
+        time.sleep(1.0)
+        run.signal(signal.SIGCONT)
+        ended = run.wait()
+    assert ended.code == 0, ended.err
+    assert ended.last_object["fault_counts"]["F73-hold"] == 1
+
+
+@repeated_when_the_host_stalls
+def test_launcher_frozen_before_the_start(state, tmp_path, host):
+    """Devices are open and nothing has moved: the processes end without it."""
+    argv = ("run", "emulated", *QUICK, "--out", str(tmp_path / "run"), "--json")
+    with started(state, *argv, host=host) as run:
+        told = tmp_path / "run" / "processes.json"
+        deadline_s = time.monotonic() + 20.0
+        while not told.exists():
+            assert time.monotonic() < deadline_s, run.err
+            time.sleep(0.002)
+        run.signal(STOP)
+        pids = json.loads(told.read_text())
+        wait_for_only(run, pids, "launcher", 12.0)
+        run.signal(signal.SIGCONT)
+        error = one_error(run.wait(10.0), 3)
+    assert "the launcher was frozen for 2 s before the start" in error["what"]
+
+
+@repeated_when_the_host_stalls
+def test_recorder_frozen(state, tmp_path, host):
+    found = strike(state, tmp_path / "run", "recorder", STOP, host, log="recovered.mcap")
+    assert found.ended.code == 5, found.ended.err
+    assert found.ended.last_object["faults"] == ["F63"]
+    assert [note for note in found.ended.last_object["notes"] if "not complete" in note]
+    assert 1000.0 < found.gone_ms < 12000.0
+
+
 @pytest.mark.long
 @repeated_when_the_host_stalls
 def test_all_devices_gone_at_once(state, tmp_path, host):

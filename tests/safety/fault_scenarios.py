@@ -73,6 +73,11 @@ def old(table: str, *keys: str) -> Alter:
     return alter
 
 
+def silent(key: str) -> Alter:
+    """Let a process of the run be silent from the first of these ticks on."""
+    return lambda inp, n: replace(inp, host=replace(inp.host, **{key: n * PERIOD_NS}))
+
+
 def moved_joint(by: float, axis: int = 2) -> Alter:
     def alter(inp: TickInput, _: int) -> TickInput:
         position = tuple(q + (by if i == axis else 0.0) for i, q in enumerate(inp.arm.joints.position))
@@ -405,7 +410,13 @@ SCENARIOS = [
     Scenario("F60-slow", "30 ms", host(skipped=3), before=lambda b: b.skip(3), also=frozenset({"F60-late"})),
     Scenario("F60-slow", "three in a row", host(skipped=1), before=lambda b: b.skip(1),
              also=frozenset({"F60-late"})),
+    Scenario("F61", "suspended", host(asleep_ns=20_000_001)),
+    Scenario("F61", "its clock went back", host(asleep_ns=-20_000_001)),
     Scenario("F63", "gone", host(recorder_alive=False)),
+    Scenario("F63", "frozen", silent("recorder_silent_ns")),
+    Scenario("F63", "records lost", host(log_dropped=1)),
     Scenario("F64", "stop key", operator(Operator.STOP)),
+    Scenario("F73-hold", "frozen", silent("launcher_silent_ns")),
+    Scenario("F73-stop", "frozen", silent("launcher_silent_ns")),
     Scenario("F68", "exception", host(loop_error=True)),
 ]  # fmt: skip

@@ -13,6 +13,7 @@ from safety import (
     agreement_checks,
     arm_checks,
     base_checks,
+    clock_checks,
     host_checks,
     motion_checks,
     sensor_checks,
@@ -76,7 +77,8 @@ def test_the_row_is_noticed_in_time_and_reacted_to(scenario):
 EVIDENCE = {
     "F01-slow": 5, "F01-hold": 8, "F01-stop": 16, "F06": 29, "F21": 1, "F24-hold": 4, "F25-hold": 4, "F25-stop": 10,
     "F31-hold": 10, "F31-stop": 25, "F33": 30, "F34": 34, "F35": 2, "F40-slow": 5, "F40-stop": 12, "F41": 2,
-    "F56": 19, "F63": 100, "F67-late": 10, "F24-stop no record": 10, "F60-slow three in a row": 2, "R01": 1,
+    "F56": 19, "F63": 100, "F63 records lost": 0, "F73-hold": 50, "F73-stop": 200,
+    "F67-late": 10, "F24-stop no record": 10, "F60-slow three in a row": 2, "R01": 1,
 }  # fmt: skip
 """Ticks of bad input without which a row must not be raised; all others speak in the first tick."""
 
@@ -158,6 +160,7 @@ CHECKS = {
     "safety.arm_checks": arm_checks,
     "safety.base_checks": base_checks,
     "safety.host_checks": host_checks,
+    "safety.clock_checks": clock_checks,
     "safety.task_checks": task_checks,
     "safety.supervisor": supervisor,
     "safety.workspace_checks": workspace_checks,

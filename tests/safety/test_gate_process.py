@@ -112,12 +112,29 @@ def test_a_gate_that_was_frozen_lets_nothing_out_whatever_wakes_it_first(rig, wa
     rig.frame(SLOW)
     rig.gate._on_control(0)
     assert rig.base.told == [SLOW]
-    rig.wait_ms(101)
     for _ in range(3):
+        rig.wait_ms(33)
         rig.frame(SLOW)
+    rig.wait_ms(2)
     getattr(rig.gate, wake)(0)
     assert rig.base.told[1:] == [ZERO]
     assert rig.record().latch_cause == Latch.PAUSED
+
+
+@pytest.mark.parametrize("wake", ["_on_control", "_on_base", "_on_clock"])
+def test_after_a_suspend_nothing_leaves_but_zero_whatever_wakes_it_first(rig, wake, monkeypatch):
+    """The clock that all ages are taken from stood still: the waiting frame looks fresh."""
+    asleep = [5 * MS]
+    monkeypatch.setattr(gate_process, "asleep_ns", lambda: asleep[0])
+    rig.frame(SLOW)
+    rig.gate._on_control(0)
+    assert rig.base.told == [SLOW]
+    asleep[0] += 3_600_000 * MS
+    rig.wait_ms(10)
+    rig.frame(BodyTwist(0.002, 0.0, 0.0))
+    getattr(rig.gate, wake)(0)
+    assert rig.base.told[1:] == [ZERO]
+    assert rig.record().latch_cause == Latch.SUSPENDED
 
 
 def test_a_pause_while_frames_are_read_is_no_silence_of_control(rig, monkeypatch):

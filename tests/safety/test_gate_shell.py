@@ -107,6 +107,7 @@ def test_what_the_base_says_is_in_the_record():
             heard(CommandEcho(SLOW), 4),
             heard(BasePose(Pose2D(1.1, 2.0, 0.5), "no unit quaternion"), 5),
             heard(BaseReport(BaseStatus(False, True, 26.5)), 6),
+            heard(SliderPose(Pose2D(8.0, 8.0, 0.0), "no unit quaternion"), 7),
         ]
     )
     assert shell.record == replace(
@@ -120,6 +121,8 @@ def test_what_the_base_says_is_in_the_record():
         odometry_seq=1,
         status=BaseStatus(False, True, 26.5),
         status_received_ns=T0 + 6 * MS,
+        object_pose=Pose2D(9.0, 9.0, 0.0),
+        object_received_ns=T0 + 3 * MS,
     )
     assert NEW.on_samples([heard(CommandEcho(SLOW), 1)]) == NEW
     assert NEW.on_samples([heard(BasePose(Pose2D(1.0, 2.0, 0.5)), 1)]).record.pose_valid
@@ -145,16 +148,29 @@ def test_silence_latches_after_50_ms():
 
 
 def test_an_own_pause_of_more_than_100_ms_latches_whatever_was_read_meanwhile():
-    shell = rolling().on_frames([frame(2, T0 + 100 * MS)], T0 + 100 * MS, T0 + 100 * MS)
+    frames = [frame(2, T0 + 50 * MS), frame(3, T0 + 100 * MS)]
+    shell = rolling().on_frames(frames, T0 + 100 * MS, T0 + 100 * MS)
     assert told(shell, 100) is None
     frozen, latching = shell.on_leaving(T0 + 100 * MS + 1)
-    assert latching == Latching(2, 42, Latch.PAUSED, "the gate itself was frozen for more than 100 ms", "F67")
+    assert latching == Latching(3, 43, Latch.PAUSED, "the gate itself was frozen for more than 100 ms", "F67")
     assert frozen.due(T0 + 100 * MS + 1) == ZERO
 
 
 def test_leaving_is_what_shows_that_the_gate_runs():
-    shell, _ = rolling().on_frames([frame(2, T0 + 90 * MS)], T0 + 90 * MS, T0 + 90 * MS).on_leaving(T0 + 90 * MS)
+    frames = [frame(2, T0 + 45 * MS), frame(3, T0 + 90 * MS)]
+    shell, _ = rolling().on_frames(frames, T0 + 90 * MS, T0 + 90 * MS).on_leaving(T0 + 90 * MS)
     assert told(shell, 190) is None
+
+
+def test_control_and_gate_frozen_together_for_80_ms_latch():
+    """Both wake at once: the frame is fresh, and what says so is the gap before it."""
+    woken = rolling().on_frames([frame(2, T0 + 80 * MS)], T0 + 80 * MS, T0 + 80 * MS).on_clock(T0 + 80 * MS, UP)
+    assert told(woken, 80) == Latching(1, 41, Latch.SILENCE, "control was silent for 50 ms", "F66")
+    assert woken.due(T0 + 80 * MS) == ZERO
+    at_the_limit = rolling().on_frames([frame(2, T0 + 50 * MS)], T0 + 50 * MS, T0 + 50 * MS)
+    assert told(at_the_limit, 50) is None
+    beyond = rolling().on_frames([frame(2, T0 + 50 * MS + 1)], T0 + 50 * MS + 1, T0 + 50 * MS + 1)
+    assert told(beyond, 50.001).latch == Latch.SILENCE
 
 
 def test_a_lost_link_latches_and_is_named():

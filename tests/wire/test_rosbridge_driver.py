@@ -241,9 +241,7 @@ def http_server():
         thread.join(5)
 
 
-@pytest.mark.parametrize(
-    "url", ["http://127.0.0.1:9090", "127.0.0.1:9090", "wss://127.0.0.1:9090", "ws://", "ws://a..b:9090"]
-)
+@pytest.mark.parametrize("url", ["http://127.0.0.1:9090", "127.0.0.1:9090", "ws://", "wss://", "ws://a..b:9090"])
 def test_a_bad_address_is_a_config_error(url):
     with pytest.raises(ConfigError):
         Ridgeback(url)

@@ -13,15 +13,19 @@ from robot_io.tick import TickInput, TickOutput, TickState
 from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
 from tools.places.atomic_file import write_json
+from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
-from tools.places.state_dir import RigLock
 from tools.report.process import ReportProcess
-from tools.rig import devices_at, folder_of, resolve_rig
+from tools.rig import devices_at, folder_of, resolve_rig, with_faults
+from tools.run.awake import awake
+from tools.run.bounds import bounds_lines, bounds_of, check_room
 from tools.run.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.verdict.object_pose import object_pose
+from tools.verdict.witness import Witness
 
 MAX_SEED = 2**63 - 1
 """The largest integer that the log can hold."""
@@ -37,19 +41,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of the simulated world (0)")
     parser.add_argument("--out", help="folder for the run, created (default: runs/RIG-TIME)")
     parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
+    parser.add_argument(
+        "--fault",
+        dest="faults",
+        action="append",
+        default=[],
+        metavar="WORDS",
+        help='inject a fault, at levels sim and emulated: "ft.frozen at 3 s for 1 s"',
+    )
     parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
     parser.add_argument(
         "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
     )
     parser.add_argument("--dry-run", action="store_true", help="show what would run, without connecting to anything")
     parser.add_argument("--move-robot", action="store_true", help="needed before any real device is opened")
+    parser.add_argument(
+        "--drive-blind", action="store_true", help="let a real base move although its sensor or arm is emulated"
+    )
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
     """Push; return the run's exit code. Raises PushError if the run could not start."""
-    rig = resolve_rig(args.rig, overrides(args))
+    rig = with_faults(resolve_rig(args.rig, overrides(args)), args.faults)
     check_flags(args, rig)
     if warning := gain_warning(rig):
         tell(warning)
@@ -59,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
     simulated = bool(devices_at(rig, "sim"))
     if not simulated:
         print_levels(rig)
-    with RigLock(rig.name) if not simulated else _NoLock():
+    print_bounds(rig)
+    with DeviceLocks(rig):
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
@@ -68,16 +84,25 @@ def run(args: argparse.Namespace) -> int:
             if early is not None:
                 early.drop()
             raise
-    summary["report"] = None
+    summary |= {"bounds": bounds_of(rig), "report": None}
+    if blind := blind_words(rig):
+        summary["notes"].insert(0, blind)
     write_summary(summary, out)
     if not args.no_report:
         write_report(summary, out, early)
         write_summary(summary, out)
+    unused = unused_faults(summary)
     with ignoring_output_errors():
         for line in verdict.person_lines(summary):
             tell(line) if args.json else print(line)
-        if args.json:
+        if args.json and not unused:
             say_json(summary)
+    if unused:
+        raise UsageError(
+            f"the fault `{unused[0]}` changed nothing",
+            where="push run",
+            do=f"Choose a time within the run; what came of the run is in {out}",
+        )
     return int(summary["exit_code"])
 
 
@@ -102,10 +127,14 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
             where="push run",
             do="Clear the floor, hold the e-stop, and add --move-robot",
         )
+    blind = blind_words(rig)
+    if blind and not args.drive_blind:
+        raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
     if not 0 <= args.seed <= MAX_SEED:
         raise UsageError(f"--seed {args.seed} is out of range", where="push run", do=f"Give 0 to {MAX_SEED}")
+    check_room(rig, args.seed)
 
 
 def print_levels(rig: RigConfig) -> None:
@@ -113,6 +142,21 @@ def print_levels(rig: RigConfig) -> None:
     for device, level in (("ft", rig.ft.level), ("arm", rig.arm.level), ("base", rig.base.level)):
         where = {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}[device]
         tell(f"{device:<5} {level:<9} {where if level == 'hardware' else ''}".rstrip())
+
+
+def blind_words(rig: RigConfig) -> str:
+    """Return in words what a real base does not feel, "" where all its devices are real or it is not real itself."""
+    emulated = devices_at(rig, "emulated")
+    if rig.base.level != "hardware" or not emulated:
+        return ""
+    verb = "is" if len(emulated) == 1 else "are"
+    return f"the real base moves blind: {' and '.join(emulated)} of its rig {verb} only emulated"
+
+
+def print_bounds(rig: RigConfig) -> None:
+    """Print what bounds the motion of a run."""
+    for line in (*bounds_lines(rig), *filter(None, [blind_words(rig)])):
+        tell(line)
 
 
 def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
@@ -130,8 +174,10 @@ def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
         "distance_m": rig.control.distance_m,
         "controller": rig.control.controller,
         "push_speed_m_per_s": rig.control.push_speed_m_per_s,
+        "bounds": bounds_of(rig),
     }
     print_levels(rig)
+    print_bounds(rig)
     tell(f"would push {rig.control.distance_m:g} m at {rig.control.push_speed_m_per_s:g} m/s; nothing was opened")
     if args.json:
         say_json(facts)
@@ -145,13 +191,14 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         from tools.run.launcher import Launcher
 
         launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
-        figures = launcher.run()
+        with awake():
+            figures = launcher.run()
     except BaseException:
         if launcher is None or not launcher.began:
             run_dir.discard(out)
         raise
     save_tare(rig, figures)
-    return verdict.summary(
+    summary = verdict.summary(
         rig,
         figures,
         out=out,
@@ -160,7 +207,10 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         level=level_of(rig),
         devices=launcher.devices(figures),
         notes=launcher.notes,
+        witness=launcher.witness(figures),
+        pushed=launcher.pushed(),
     )
+    return with_injected(summary, launcher.injected(figures))
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
@@ -197,8 +247,9 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
             f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Free some space"
         ) from None
     live.end()
+    live.close()
     save_tare(rig, figures)
-    return verdict.summary(
+    summary = verdict.summary(
         rig,
         figures,
         out=out,
@@ -207,7 +258,20 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         level="sim",
         devices=figures["devices"],
         notes=[],
+        witness=Witness(),
+        pushed=object_pose(rig.path, log.object_poses),
     )
+    return with_injected(summary, figures["injected"])
+
+
+def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
+    """Return the summary and, if faults were injected, how many samples each has changed."""
+    return summary | {"injected": counts} if counts else summary
+
+
+def unused_faults(summary: dict[str, Any]) -> list[str]:
+    """Return the faults to inject that changed nothing."""
+    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]
 
 
 def save_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
@@ -239,11 +303,3 @@ def write_report(summary: dict[str, Any], out: Path, ready: ReportProcess | None
         tell(f"no report: {reason}; `push report {out}` makes one from the log")
     else:
         summary["report"] = str(out / "report.html")
-
-
-class _NoLock:
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, *_: object) -> None:
-        return None

@@ -9,14 +9,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from robot_io.errors import LogDamaged
+from robot_io.geometry import yaw_from_quaternion
 from robot_io.log.chain import TickChain
 from robot_io.log.channels import BY_TOPIC, CHANNELS, Kind
+from robot_io.log.ros_messages import POSE_STAMPED
 from robot_io.log.seal import LogSeal, config_seal
 from robot_io.log.world_messages import STATE_CDR
 from robot_io.mcap.log_file import McapLog
+from robot_io.messages import Pose2D
 from robot_io.rig.config import rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
-from tools.log.derivation import TICK_TOPIC, Derivation
+from tools.log.derivation import SLIDER_TOPIC, TICK_TOPIC, Derivation
 from tools.log.tick_topics import Message
 
 OFFSET_FACT = "wall_offset_ns"
@@ -36,6 +39,7 @@ class RunLog:
         self._config_seal = config_seal(config_text.encode())
         self._declared: set[str] = set()
         self._scene_written = False
+        self._object: tuple[bytes, bytes] | None = None
         self._seal = LogSeal()
         self.chain = TickChain()
         self.undecodable = 0
@@ -45,6 +49,14 @@ class RunLog:
     def messages(self) -> int:
         """Number of messages written, including derived ones."""
         return self._log.messages
+
+    @property
+    def object_poses(self) -> tuple[Pose2D, Pose2D] | None:
+        """The first and the last pose of the object, WORLD frame; None if no valid one was written."""
+        if self._object is None:
+            return None
+        first, last = (_planar(payload) for payload in self._object)
+        return (first, last) if first and last else None
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
         """Write one ring record and the messages derived from it. Raises OSError when writing to disk fails."""
@@ -101,6 +113,8 @@ class RunLog:
             channel = BY_TOPIC[message.topic]
             self._log.channel(channel.topic, channel.cdr_type, latched=channel.latched)
             self._seal.declare(channel.topic, channel.cdr_type.name, channel.cdr_type.schema_text.encode())
+        if message.topic == SLIDER_TOPIC:
+            self._object = (self._object[0] if self._object else message.payload, message.payload)
         self._seal.note(message.topic, message.log_time_ns, message.payload)
         self._log.write(message.topic, message.log_time_ns, message.payload)
 
@@ -115,3 +129,14 @@ class RunLog:
             return
         for message in derived:
             self._write(message)
+
+
+def _planar(payload: bytes) -> Pose2D | None:
+    """Return a pose on the floor, None if the message cannot be decoded or lies on its side."""
+    try:
+        pose = POSE_STAMPED.decode(payload).pose
+    except LogDamaged:
+        return None
+    turned = pose.orientation
+    yaw = yaw_from_quaternion(turned.x, turned.y, turned.z, turned.w)
+    return None if yaw is None else Pose2D(pose.position.x, pose.position.y, yaw)

@@ -7,10 +7,14 @@ import os
 from pathlib import Path
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file, replacing any existing one. Raises OSError, and then leaves nothing behind."""
+def write_atomically(path: Path, content: bytes, *, mode: int = 0o644) -> None:
+    """Write a file, replacing any existing one. Raises OSError, and then leaves nothing behind.
+
+    mode: the file's permissions, less those that the umask takes away.
+    """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
+        part.touch(mode)
         part.write_bytes(content)
         part.replace(path)
     except OSError:

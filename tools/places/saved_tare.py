@@ -45,7 +45,7 @@ def _digest(parts: object) -> str:
 def save(rig: RigConfig, bias: Vector6, joints: Vector6) -> None:
     """Save a tare for later runs of this rig. Raises OSError and EnvironmentFault."""
     tare = SavedTare(bias, joints, power_cycle(rig), time.time())
-    write_atomically(_path(rig), msgspec.json.encode(tare))
+    write_atomically(_path(rig), msgspec.json.encode(tare), mode=0o600)
 
 
 def load(rig: RigConfig) -> SavedTare:

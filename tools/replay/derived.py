@@ -14,7 +14,7 @@ import msgspec
 from robot_io.errors import LogDamaged
 from robot_io.log import log_format
 from robot_io.log.channels import DERIVED
-from robot_io.log.messages import GATE_SAYS, SAFETY_EVENT
+from robot_io.log.messages import GATE_SAYS, INJECTED, SAFETY_EVENT
 from robot_io.log.world_messages import WorldState
 from robot_io.mcap.read import ChannelInfo
 from robot_io.rig.config import RigConfig
@@ -86,7 +86,7 @@ class DerivedReplayer:
         """Take a message of any other topic."""
         if topic == SLIDER_TOPIC and self._derive.slider_is_tracked:
             self._expect(SLIDER_TOPIC, log_time_ns, lambda: self._derive.slider(payload, log_time_ns))
-        if topic not in self._compared or (topic == EVENTS and _is_gate_event(payload)):
+        if topic not in self._compared or (topic == EVENTS and _is_input(payload)):
             return
         if topic in SCENE and not self._scene_derived:
             self._scene_derived = True  # derived from the first record's time, which only these messages hold
@@ -148,10 +148,11 @@ class DerivedReplayer:
             del self._waiting[key]
 
 
-def _is_gate_event(payload: bytes) -> bool:
-    """Return whether the gate itself reported an event: that is an input, not derived."""
+def _is_input(payload: bytes) -> bool:
+    """Return whether an event is an input, not derived: the gate itself reported it, or a fault was injected."""
     try:
-        return SAFETY_EVENT.decode(payload).text.startswith(GATE_SAYS)
+        event = SAFETY_EVENT.decode(payload)
+        return event.kind == INJECTED or event.text.startswith(GATE_SAYS)
     except LogDamaged:
         return False
 

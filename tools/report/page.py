@@ -22,7 +22,7 @@ from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.mcap.walk import Grown
 from safety.faults import FAULTS
 from tools.places.atomic_file import write_atomically
-from tools.report import run_summary
+from tools.report import run_summary, run_verdict
 from tools.report.growing_log import GrowingLog
 from tools.report.run_data import RunData, read_run
 from tools.report.style import PHASE_COLOURS, phase_spans
@@ -94,7 +94,7 @@ def read_summary_file(path: Path) -> dict[str, Any]:
 
 def page(run: RunData, summary: dict[str, Any], pngs: dict[str, bytes], mark: str) -> str:
     """Return the page. Everything that comes from the log or the summary is escaped."""
-    verdict = run_summary.verdict(run)
+    verdict = run_verdict.verdict(run, summary)
     rig = run.rig
     law = "force feedback" if rig.control.controller == "force" else "open loop"
     level = run.facts.get("level", "unknown level")
@@ -110,6 +110,7 @@ def page(run: RunData, summary: dict[str, Any], pngs: dict[str, bytes], mark: st
         subtitle=_esc(subtitle),
         notes="\n".join(f"<p>{_esc(note)}</p>" for note in _notes(run, summary)),
         tiles="\n".join(f"<div><dt>{_esc(a)}</dt><dd>{_esc(b)}</dd></div>" for a, b in run_summary.tiles(run)),
+        trust=_table(("", "says", ""), run_verdict.trust_rows(verdict.trust)) or "<p>Nothing is known.</p>",
         figures=_figures(run, pngs),
         safety=_safety(run),
         devices="\n".join(

@@ -1,9 +1,9 @@
-"""Summarise a run from its log alone: verdict, key figures, settings that differ, timing, counters."""
+"""Summarise a run from its log alone: key figures, settings that differ, timing, counters."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -11,52 +11,10 @@ import numpy as np
 from control.run_notes import outcome
 from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
 from robot_io.tick import Phase
-from safety.faults import FAULTS
 from tools.kinds import device_names
 from tools.report.bounded_series import Floats
 from tools.report.run_data import RunData
 from tools.report.style import phase_spans
-from tools.terminal.verdict import VERDICTS, contact_loss_reason
-
-
-class Verdict(NamedTuple):
-    """How the run ended: one line, the reason, and whether it succeeded."""
-
-    line: str
-    why: str
-    good: bool
-
-
-def verdict(run: RunData) -> Verdict:
-    """Return the verdict of a run as far as its log shows it."""
-    if run.last is None:
-        return Verdict(
-            "Did not start", "The loop did not start: the devices were not ready, or it was stopped first.", False
-        )
-    last = run.last
-    end = outcome(last.input, last.after, last.output)
-    distance, lateral = f"{end['distance_m']:.2f} m", f"{end['lateral_error_m']:+.3f} m"
-    faults = [FAULTS[fault].text if fault in FAULTS else fault for fault in last.output.faults]
-    # Warnings do not explain the end, unless there is nothing else.
-    strong = [FAULTS[fault].text for fault in last.output.faults if fault in FAULTS and FAULTS[fault].mode]
-    why = "; ".join(strong or faults)
-    if not last.output.finished:
-        phase = str(end["phase"]).lower().replace("_", " ")
-        return Verdict(
-            f"Aborted after {distance}",
-            f"The log ends during the run (phase {phase}){': ' + why if why else ''}.",
-            False,
-        )
-    if last.output.exit_code == 0:
-        return Verdict(f"Pushed {distance}", f"Lateral error at the end: {lateral}.", True)
-    name = VERDICTS.get(last.output.exit_code, "error")
-    if not why:
-        why = (
-            contact_loss_reason(last.after.control.contact_seen) if name == "contact lost" else "see the safety events"
-        )
-    return Verdict(
-        f"{name.capitalize()} after {distance}", f"{why.capitalize()}. Lateral offset at the end: {lateral}.", False
-    )
 
 
 def tiles(run: RunData) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ import msgspec
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.driver import Driver
 from robot_io.errors import DeviceUnreachable, PushError
-from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.process import die_with_parent, is_hung_up, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
@@ -29,7 +29,7 @@ PERIOD_NS = 4 * NS_PER_MS
 
 
 def main() -> int:
-    """Serve until SIGTERM; return the exit code, that of the error if the arm could not be opened."""
+    """Serve until SIGTERM or the end of the run; return the exit code, the error's if the arm could not be opened."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=ArmKindJob)
     die_with_parent(job.launcher_pid)
@@ -55,7 +55,7 @@ def main() -> int:
     record = TypedRecord(job.record_fd, ARM_RECORD)
     newest = ArmRecord(child_pid=os.getpid())
     try:
-        while not asked:
+        while not (asked or is_hung_up(job.run_fd)):
             newest = publish(driver, record, newest, servo=arm.hold == "servo")
             if newest.link == LinkState.LOST:
                 lost = DeviceUnreachable(

@@ -9,13 +9,15 @@ import select
 import signal
 import socket
 import sys
+import time
 
 import msgspec
 
 from control.loop import ControlLoop, Watch
 from control.run_notes import outcome
+from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.driver import Sensor
-from robot_io.errors import PushError
+from robot_io.errors import EnvironmentFault, PushError
 from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
@@ -23,14 +25,20 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
 from robot_io.rig.config import rig_from_toml
 from robot_io.ur10.driver import ArmLink
+from sim_backend.injection.arm import InjectedArm
+from sim_backend.injection.event import event_writer
+from sim_backend.injection.injection import Injection
+from sim_backend.injection.sensor import InjectedSensor
 from tools.kinds import name_of
 from tools.run.jobs import ControlJob
 from tools.run.run_state import initial_state, status_line
 from tools.run.tick_core import TickCore
 
 PRIORITY = 80
-VERDICT_WITHIN_S = 60.0
-"""How long a blocked launcher (a stopped terminal) may take to read the result; the base is already at rest."""
+VERDICT_WITHIN_S = 3.0
+"""How long a launcher on a busy machine may take to read the result; the base is already at rest."""
+LAUNCHER_SILENT_S = 2.0
+"""A launcher that was silent for this long before the start is frozen, and nobody holds the operator's keys."""
 
 
 class DriverWarnings(logging.Handler):
@@ -60,6 +68,8 @@ def main() -> int:
     except PushError as error:
         status.error(error)
         return error.exit_code
+    ring = Ring(job.ring_fd)
+    injection = Injection(rig.faults.inject, monotonic_ns, event_writer(ring.push, job.wall_offset_ns))
     core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = GateLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
@@ -69,10 +79,10 @@ def main() -> int:
         initial_state(job.saved_tare),
         rate_hz=rig.loop.rate_hz,
         sensor_rate_hz=rig.ft.declared.rate_hz,
-        sensor=sensor,
-        arm=arm,
+        sensor=InjectedSensor(sensor, injection, rig) if injection.of("ft") else sensor,
+        arm=InjectedArm(arm, injection) if injection.of("arm") else arm,
         base=base,
-        ring=Ring(job.ring_fd),
+        ring=ring,
         watch=watch,
         operator_fd=job.operator_fd,
         on_status=lambda inp, state, output: status.say("status", **status_line(inp, state, output)),
@@ -89,7 +99,7 @@ def main() -> int:
         sensor.close()
         raise
     status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
-    if not _wait_for_go(job.operator_fd, sensor):
+    if not _wait_for_go(job.operator_fd, sensor, status):
         base.close()
         sensor.stop()
         sensor.close()
@@ -98,23 +108,31 @@ def main() -> int:
     gc.freeze()
     gc.disable()
     lock_memory()
+    injection.begin(monotonic_ns() + round(NS_PER_S / rig.loop.rate_hz))
     loop.run()
     base.close()  # first: the gate reads the EOF as the end and sends its last zeros
     gc.enable()
-    return _finish(loop, sensor, status, rig.loop.rate_hz)
+    return _finish(loop, sensor, status, rig.loop.rate_hz, injection.counts("ft", "arm"))
 
 
-def _wait_for_go(operator_fd: int, sensor: Sensor) -> bool:
+def _wait_for_go(operator_fd: int, sensor: Sensor, status: StatusPipe) -> bool:
     """Return whether the launcher lets the loop start; keep the sensor drained while waiting."""
     os.set_blocking(operator_fd, False)
-    while True:
+    heard_s = time.monotonic()
+    while time.monotonic() - heard_s < LAUNCHER_SILENT_S:
         readable, _, _ = select.select([operator_fd], [], [], 0.05)
         sensor.drain()
         if readable:
-            return os.read(operator_fd, 1) == b"G"
+            heard_s = time.monotonic()
+            key = os.read(operator_fd, 1)
+            if key != b"H":
+                return key == b"G"
+    frozen = f"the launcher was frozen for {LAUNCHER_SILENT_S:g} s before the start; nothing has moved"
+    status.error(EnvironmentFault(frozen, do="Start again"))
+    return False
 
 
-def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float) -> int:
+def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float, injected: dict[str, int]) -> int:
     counters = sensor.health().counters
     sensor.stop()
     sensor.close()
@@ -126,9 +144,9 @@ def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: floa
         "finished",
         **figures,
         loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns),
-        events=loop.notes.events,
-        fault_counts=loop.notes.fault_counts,
+        **loop.notes.figures(),
         ft=counters,
+        injected=injected,
         error="" if loop.error is None else f"{type(loop.error).__name__}: {loop.error}",
     )
     if loop.error is not None:

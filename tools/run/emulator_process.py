@@ -16,7 +16,7 @@ import msgspec
 from robot_io.clock import NS_PER_MS, monotonic_ns
 from robot_io.errors import PushError
 from robot_io.ipc.event_loop import EventLoop
-from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.process import die_with_parent, is_hung_up, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import rig_from_toml
@@ -27,16 +27,22 @@ from tools.run.jobs import EmulatorJob
 
 PRIORITY = 70
 LINGER_NS = 1_000 * NS_PER_MS
+ORPHANED_NS = 2_000 * NS_PER_MS
 REST_NS = 100 * NS_PER_MS
 WATCH_NS = 20 * NS_PER_MS
 
 
 class StopAtRest:
-    """Stops the loop after SIGTERM: when the base has come to rest, or after LINGER_NS at the latest."""
+    """Stops the loop after SIGTERM: when the base has come to rest, or after LINGER_NS at the latest.
 
-    def __init__(self, loop: EventLoop, world: World) -> None:
+    The same ORPHANED_NS after control has ended: a launcher that is frozen sends no SIGTERM.
+    """
+
+    def __init__(self, loop: EventLoop, world: World, run_fd: int) -> None:
         self._loop = loop
         self._world = world
+        self._run_fd = run_fd
+        self._control_gone_ns = 0
         self._asked = False
         self._since_ns = 0
         self._rest_ns = 0
@@ -49,7 +55,10 @@ class StopAtRest:
     def _check(self, _deadline_ns: int) -> None:
         now_ns = monotonic_ns()
         self._world.advance_to(now_ns)
-        if not self._asked:
+        if not self._control_gone_ns and is_hung_up(self._run_fd):
+            self._control_gone_ns = now_ns
+        orphaned = self._control_gone_ns and now_ns - self._control_gone_ns >= ORPHANED_NS
+        if not (self._asked or orphaned):
             return
         self._since_ns = self._since_ns or now_ns
         twist = self._world.read_base(now_ns).twist
@@ -79,7 +88,7 @@ def main() -> int:
             emulator.close()
         status.error(error)
         return error.exit_code
-    StopAtRest(loop, world)
+    StopAtRest(loop, world, job.run_fd)
     status.say(
         "ready",
         addresses={device: address_of(emulator) for device, emulator in opened.items()},

@@ -24,7 +24,7 @@ def figures_from_log(log: Path, rate_hz: float, exit_code: int) -> dict[str, Any
     for message in read_log(log):
         if message.topic == "/control/tick":
             last = TICK_CDR.decode(message.payload)
-            notes.note(last.input, last.output)
+            notes.note(last.input, last.after, last.output)
             first_ns = first_ns or last.input.now_ns
             ticks += 1
             skipped += last.input.host.skipped
@@ -38,8 +38,11 @@ def figures_from_log(log: Path, rate_hz: float, exit_code: int) -> dict[str, Any
     faults = [event.fault for event in of_gate]
     ended_s = round((last.input.now_ns - first_ns) * 1e-9, 3)
     end = {"t_s": ended_s, "tick": last.input.tick, "mode": Mode.STOP.name, "faults": faults}
+    if faults and not figures["first_fault"]:
+        figures |= {"first_fault": faults[0], "first_value": None, "first_fault_s": ended_s}
     return {
         **figures,
+        **notes.figures(),
         "exit_code": exit_code,
         "faults": faults,
         "loop": {"rate_hz": rate_hz, "ticks": ticks, "skipped": skipped},

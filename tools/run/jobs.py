@@ -24,6 +24,8 @@ class ControlJob(msgspec.Struct, frozen=True):
     gate_pidfd: int
     arm_pidfd: int
     recorder_pidfd: int
+    wall_offset_ns: int
+    """Wall clock minus CLOCK_MONOTONIC, for stamps in the log."""
 
 
 class ArmKindJob(msgspec.Struct, frozen=True):
@@ -33,6 +35,8 @@ class ArmKindJob(msgspec.Struct, frozen=True):
     kind_folder: str
     launcher_pid: int
     record_fd: int
+    run_fd: int
+    """EOF on it means that control has ended."""
     status_fd: int
 
 
@@ -46,4 +50,6 @@ class EmulatorJob(msgspec.Struct, frozen=True):
     """The emulated devices: any of ft, arm and base."""
     launcher_pid: int
     ring_fd: int
+    run_fd: int
+    """EOF on it means that control has ended."""
     status_fd: int

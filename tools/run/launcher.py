@@ -16,12 +16,16 @@ import os
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.errors import OperatorStop, PushError, SafetyStop
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import leave_realtime, try_realtime
 from robot_io.ipc.spawn import Child
+from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
+from robot_io.rig.fault_words import parse_fault
 from safety.gate import Latch
 from tools.kinds import name_of
 from tools.places import run_dir
@@ -32,6 +36,8 @@ from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
 from tools.terminal.start_errors import combined_error, start_timeout
+from tools.verdict.object_pose import ObjectPose, object_pose
+from tools.verdict.witness import Witness, witness_of
 
 PRIORITY = 1
 """Below all other processes of the run. Not for its work: a killed process needs processor time to die, and the
@@ -45,6 +51,8 @@ FROZEN_NS = NS_PER_S
 """If the gate has latched and control has sent no status for this long, it is frozen and is killed."""
 FIRST_STATUS_NS = 5 * NS_PER_S
 """If control has sent no status this long after its start, it froze before the gate could detect it."""
+BEAT_NS = NS_PER_S // 10
+"""How often control is told that the launcher lives: silent for 0.5 s, the base holds, for 2 s, it stops (F73)."""
 SECOND_STOP_NS = NS_PER_S
 """A second stop counts only this long after the first: `timeout` and shells may send one stop twice."""
 ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0}
@@ -76,6 +84,7 @@ class Launcher:
     def run(self) -> dict[str, Any]:
         """Run to the end; return the figures. Raises PushError if the run did not start or its result is unknown."""
         keys = OperatorKeys(self._loop, self._stop, self._resume)
+        self._loop.call_every(BEAT_NS, lambda _: self._processes.send_to_control(b"H"))
         try:
             try:
                 self._start()
@@ -87,6 +96,7 @@ class Launcher:
             self._note_process_failures()
             return self._figures()
         finally:
+            self._live.close()
             for child in self._children.values():
                 child.close()
 
@@ -97,11 +107,34 @@ class Launcher:
 
     def devices(self, figures: dict[str, Any]) -> dict[str, dict[str, int]]:
         """Return the counters of the three drivers, by device name."""
+        counters, injected = self._finished_event("gate").get("counters", {}), self.injected(figures)
         return {
             name_of(self._rig.ft.kind): figures["ft"],
             name_of(self._rig.arm.kind): {"packets": figures["arm_packets"]},
-            name_of(self._rig.base.kind): self._finished_event("gate").get("counters", {}),
+            name_of(self._rig.base.kind): {k: n for k, n in counters.items() if k not in injected},
         }
+
+    def witness(self, figures: dict[str, Any]) -> Witness:
+        """Return what the other processes say of the run, once `run` has returned."""
+        recorder, gate = self._children["recorder"], self._children["gate"]
+        return witness_of(
+            self.log,
+            figures["loop"]["ticks"],
+            recorder=recorder.finished or f"the recorder process {recorder.how_it_ended()}",
+            gate=gate.finished or f"the gate process {gate.how_it_ended()}",
+        )
+
+    def pushed(self) -> ObjectPose | None:
+        """Return where the object is, once `run` has returned; None if that is not known."""
+        poses = self._finished_event("recorder").get("object_poses")
+        return object_pose(self._rig.path, msgspec.convert(poses, tuple[Pose2D, Pose2D] | None))
+
+    def injected(self, figures: dict[str, Any]) -> dict[str, int]:
+        """Return how many samples each injected fault changed, by its words; none for a process that did not say."""
+        by_gate: dict[str, int] = self._finished_event("gate").get("counters", {})
+        by_control: dict[str, int] = figures.get("injected", {})
+        words = {parse_fault(word).text for word in self._rig.faults.inject}
+        return by_control | {word: n for word, n in by_gate.items() if word in words}
 
     # --- start -----------------------------------------------------------------------------------------------
 
@@ -198,7 +231,7 @@ class Launcher:
             self._children["control"].process.kill()
 
     def _resume(self) -> None:
-        if self._began:  # before the start, any byte but G would end control
+        if self._began:  # before the start, any byte but G and H would end control
             self._processes.send_to_control(b"R")
 
     # --- end -------------------------------------------------------------------------------------------------
@@ -247,6 +280,8 @@ class Launcher:
             if figures["error"]:
                 self.notes.append(f"{figures['error']}; this is a bug, its traceback is in {control.save_stderr()}")
             return figures
+        if control.errors:
+            raise control.errors[-1]
         if self._killed_by_operator:
             code, how = OperatorStop.exit_code, "was killed by the operator"
         elif control.process.returncode < 0:

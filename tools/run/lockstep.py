@@ -19,11 +19,17 @@ from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
 from robot_io.messages import ArmRecord
-from robot_io.rig.config import RigConfig
+from robot_io.rig.config import RigConfig, rig_from_toml
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.fault_words import FaultWord
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety.gate_shell import GateShell
 from safety.motion_bounds import total_bounds
+from sim_backend.injection.arm import InjectedArm
+from sim_backend.injection.base import InjectedBase
+from sim_backend.injection.event import event_writer
+from sim_backend.injection.injection import Injection
+from sim_backend.injection.sensor import InjectedSensor
 from sim_backend.ridgeback.settings import ridgeback_settings
 from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
@@ -77,6 +83,13 @@ class Lockstep:
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig, seed), pose_source=rig.base.pose_source
         )
+        self._note_injected = event_writer(push, SIM_EPOCH_NS - START_NS)
+        self.first_injected_ns: int | None = None
+        self.injection = Injection(rig.faults.inject, self._clock, self._on_injected)
+        self.injection.begin(START_NS)
+        self._ft_edge = InjectedSensor(self._ft, self.injection, rig)
+        self._arm_edge = InjectedArm(self._arm, self.injection)
+        self._base_edge = InjectedBase(self._base, self.injection)
         self._core = TickCore.of(rig, in_contact=saved is not None)
         self._state = initial_state(saved)
         self._gate = GateShell(self._core.safety.envelope, total_bounds(rig), START_NS)
@@ -110,13 +123,13 @@ class Lockstep:
         return {
             **outcome(inp, self._state, output),
             "loop": {"rate_hz": self.rig.loop.rate_hz, "ticks": tick + 1, "skipped": 0},
-            "events": self.notes.events,
-            "fault_counts": self.notes.fault_counts,
+            **self.notes.figures(),
             "devices": counters,
+            "injected": self.injection.counts(),
         }
 
     def _tick(self, tick: int, now_ns: int) -> tuple[TickInput, TickOutput]:
-        readings = self._ft.drain()
+        readings = self._ft_edge.drain()
         self._take_base(now_ns)
         operator, self.operator = self.operator, Operator.NONE
         inp = TickInput(
@@ -124,8 +137,8 @@ class Lockstep:
             now_ns,
             int(operator),
             HostInput(0, 0, True, True, True, False, 0),
-            ft_input(readings, self._ft.health(), 0),
-            self._arm.read() or ArmRecord(),
+            ft_input(readings, self._ft_edge.health(), 0),
+            self._arm_edge.read() or ArmRecord(),
             self._gate.record,
         )
         try:
@@ -142,34 +155,48 @@ class Lockstep:
         message = tick_message(inp, self._state, after, output)
         self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
         self._state = after
-        self.notes.note(inp, output)
+        self.notes.note(inp, after, output)
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
         """Pass the command through the gate, as the gate process does."""
         frame = GateFrame(self._gate.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
-        self._gate = self._gate.on_frames((frame,), now_ns, now_ns).on_clock(now_ns, self._base.health())
+        self._gate = self._gate.on_frames((frame,), now_ns, now_ns)
+        self._turn_gate(now_ns)
+
+    def _turn_gate(self, now_ns: int) -> None:
+        """Let the gate judge and send what is due."""
+        self._gate = self._gate.on_clock(now_ns, self._base_edge.health())
         self._gate, latching = self._gate.on_leaving(now_ns)
         if latching is not None:
             self._gate_log.latched(now_ns, *astuple(latching))
         wanted = self._gate.due(now_ns)
         if wanted is not None:
-            really = self._base.command(wanted)
+            left_ns = self._base_edge.sent_ns
+            really = self._base_edge.command(wanted)
+            if self._base_edge.sent_ns == left_ns:  # nothing is sent over a lost link
+                self._gate = self._gate.on_sent(wanted, None, now_ns)
+                return
             self._gate = self._gate.on_sent(wanted, really, now_ns)
             self._gate_log.sent(now_ns, really)
 
+    def _on_injected(self, word: FaultWord, now_ns: int) -> None:
+        if self.first_injected_ns is None:
+            self.first_injected_ns = now_ns
+        self._note_injected(word, now_ns)
+
     def _take_base(self, now_ns: int) -> None:
-        samples = self._base.drain()
+        samples = self._base_edge.drain()
         for sample in samples:
             self._gate_log.inbound(sample)
         # No pings here: there is no bridge that could answer.
         self._gate = self._gate.on_samples(samples).on_publish(
-            now_ns, newest_inbound_ns=self._base.newest_inbound_ns, newest_pong_ns=0
+            now_ns, newest_inbound_ns=self._base_edge.newest_inbound_ns, newest_pong_ns=0
         )
 
 
 def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
     """Open the log of a lockstep run; its facts hold nothing that differs from run to run."""
-    facts = run_facts("sim", seed, in_contact=in_contact)
+    facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact)
     return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
 
 

@@ -6,7 +6,8 @@
     gate link          control <-> gate                              SEQPACKET; EOF means control has ended
     records            gate -> control, arm -> control               memfd, newest wins
     pidfds             gate, arm, recorder -> control                readable when the process has ended
-    operator pipe      launcher -> control                           one byte each: go, stop, resume, log failed
+    run pipe           control -> arm, emulators                     nothing is written: EOF means control has ended
+    operator pipe      launcher -> control                           a byte each: go, stop, resume, log failed, alive
     status pipes       each of them -> launcher                      JSON lines
 
 A copy of an inherited descriptor left open in the launcher would hide the end of the process that holds it, so all
@@ -23,7 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 from robot_io.clock import wall_offset_ns
 from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
@@ -37,11 +38,12 @@ from safety.motion_bounds import total_bounds
 from safety.settings import SafetySettings
 from tools.kinds import is_shipped
 from tools.places.saved_tare import SavedTare
-from tools.rig import devices_at
+from tools.rig import devices_at, faults_of
+from tools.run.injected_gate import InjectedGateJob
 from tools.run.jobs import ArmKindJob, ControlJob, EmulatorJob
 from tools.run.recorder import Job as RecorderJob
 from tools.run.recorder import RingSource
-from tools.run.run_facts import level_of, run_facts
+from tools.run.run_facts import run_facts
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes without a drain by the recorder."""
@@ -74,6 +76,7 @@ class Processes:
         self._offset_ns = wall_offset_ns()
         self._rings = {name: Ring.create(f"{name}-log", size) for name, size in RING_BYTES.items()}
         self._alive = {name: os.pipe() for name in RING_BYTES}
+        self._run = os.pipe()
         self._operator_fd = -1
         self.children: dict[str, Child] = {}
 
@@ -88,8 +91,11 @@ class Processes:
         if not emulated:
             return []
         ring_fd, alive_fd = self._rings["world"].fd, self._alive["world"][1]
-        job = EmulatorJob(rig_to_toml(self._rig), self._kind_folder, self._seed, emulated, os.getpid(), ring_fd, -1)
-        self._spawn("emulators", "tools.run.emulator_process", job, [ring_fd, alive_fd])
+        run_fd = self._run[0]
+        job = EmulatorJob(
+            rig_to_toml(self._rig), self._kind_folder, self._seed, emulated, os.getpid(), ring_fd, run_fd, -1
+        )
+        self._spawn("emulators", "tools.run.emulator_process", job, [ring_fd, alive_fd, run_fd])
         return ["emulators"]
 
     def start_remaining(self, config_text: str) -> list[str]:
@@ -110,7 +116,7 @@ class Processes:
         control_end.close()
         gate_end.close()
         os.close(operator_read)
-        for read_end, write_end in self._alive.values():
+        for read_end, write_end in (*self._alive.values(), self._run):
             os.close(read_end)
             os.close(write_end)
         for ring in self._rings.values():
@@ -120,7 +126,7 @@ class Processes:
         return ["recorder", "gate", "arm", "control"]
 
     def send_to_control(self, key: bytes) -> None:
-        """Send G (go), S (stop), R (resume) or L (log failed) to control; ignored if control is not running."""
+        """Send G (go), S (stop), R (resume), L (log failed) or H (alive) to control; ignored if it is not running."""
         if self._operator_fd >= 0:
             with contextlib.suppress(OSError):
                 os.write(self._operator_fd, key)
@@ -153,7 +159,7 @@ class Processes:
         return rig
 
     def _start_recorder(self, config_text: str) -> None:
-        facts = run_facts(level_of(self._rig), self._seed, in_contact=self._saved is not None)
+        facts = run_facts(self._rig, self._seed, in_contact=self._saved is not None)
         facts["kernel"] = platform.release()
         rings = [RingSource(name, ring.fd) for name, ring in self._rings.items()]
         alive = [self._alive[name][0] for name in ("control", "gate", "world")]
@@ -167,15 +173,19 @@ class Processes:
         job = GateJob(
             rig.base, rig.frames, self._kind_folder, limits, bounds, control_fd, record_fd, ring_fd, -1, self._offset_ns
         )
-        self._spawn("gate", "safety.gate_process", job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
+        module = "safety.gate_process"
+        if faults := faults_of(rig, "base"):
+            job, module = InjectedGateJob(**asdict(job), faults=faults), "tools.run.injected_gate"
+        self._spawn("gate", module, job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
         if not is_shipped("arm", rig.arm.kind):
-            own = ArmKindJob(rig_to_toml(rig), self._kind_folder, os.getpid(), record_fd, -1)
-            self._spawn("arm", "tools.run.arm_process", own, [record_fd])
+            own = ArmKindJob(rig_to_toml(rig), self._kind_folder, os.getpid(), record_fd, self._run[0], -1)
+            self._spawn("arm", "tools.run.arm_process", own, [record_fd, self._run[0]])
             return
         pose, tolerance_rad = rig.arm.held_pose_rad, rig.arm.held_pose_tolerance_rad
-        self._adopt(spawn_arm(ArmJob(rig.arm.host, rig.arm.hold, record_fd, os.getpid(), pose, tolerance_rad)))
+        job = ArmJob(rig.arm.host, rig.arm.hold, record_fd, os.getpid(), pose, tolerance_rad, run_fd=self._run[0])
+        self._adopt(spawn_arm(job))
 
     def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:
         ring_fd, alive_fd = self._rings["control"].fd, self._alive["control"][1]
@@ -192,9 +202,12 @@ class Processes:
             ring_fd,
             operator_fd,
             -1,
-            *pidfds,
+            pidfds[0],
+            pidfds[1],
+            pidfds[2],
+            self._offset_ns,
         )
-        fds = [gate_fd, base_fd, arm_fd, ring_fd, alive_fd, operator_fd, *pidfds]
+        fds = [gate_fd, base_fd, arm_fd, ring_fd, alive_fd, operator_fd, self._run[1], *pidfds]
         self._spawn("control", "tools.run.control_process", job, fds)
         for pidfd in pidfds:
             os.close(pidfd)

@@ -167,6 +167,7 @@ class Recorder:
             dropped=dropped,
             lost=self._lost,
             undecodable=self._log.undecodable,
+            object_poses=self._log.object_poses,
         )
 
 

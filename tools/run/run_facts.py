@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import platform
 
 from robot_io.rig.config import RigConfig
+from tools.run.bounds import bounds_of
 from tools.run.code_facts import code_facts
 
 
@@ -18,13 +20,15 @@ def code_and_machine() -> dict[str, str]:
     }
 
 
-def run_facts(level: str, seed: int, *, in_contact: bool) -> dict[str, str]:
+def run_facts(rig: RigConfig, seed: int, *, in_contact: bool) -> dict[str, str]:
     """Return the facts of a run; none differs between two runs of the same code on the same machine."""
     return {
         **code_and_machine(),
-        "level": level,
+        "level": level_of(rig),
         "seed": str(seed),
         "in_contact": str(in_contact),
+        **({"faults_injected": "; ".join(rig.faults.inject)} if rig.faults.inject else {}),
+        "bounds": json.dumps(bounds_of(rig)),
     }
 
 

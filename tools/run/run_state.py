@@ -27,5 +27,8 @@ def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[st
         "theta_p": round(control.theta_p, 4),
         "speed": round(control.speed, 4),
         "faults": list(output.faults),
+        "fault_values": list(output.fault_values),
+        "first_fault": state.safety.first_fault,
+        "first_value": state.safety.first_value,
         "late_ms": round(inp.host.late_ns * 1e-6, 3),
     }

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import os
 import select
+import stat
 import sys
 import time
 from typing import Any
 
 from robot_io.rig.config import RigConfig
-from safety.faults import FAULTS
+from tools.verdict.first_cause import fault_words, limit_and_unit, stronger_than
 
 USUAL_COLUMNS = 80
 """Width assumed if the terminal does not report it."""
@@ -23,17 +24,14 @@ class LiveLine:
         self._rig = rig
         self._quiet = quiet
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._fd = _without_waiting()
         self._last_s = 0.0
         self._width = 0
         self._faults: tuple[str, ...] = ()
 
     def show(self, status: dict[str, Any]) -> None:
         """Show one status event of control."""
-        faults = tuple(status["faults"])
-        for fault in faults:
-            if fault not in self._faults:
-                self.say(f"{fault} {FAULTS[fault].text if fault in FAULTS else ''} -> {status['mode']}")
-        self._faults = faults
+        self._tell_faults(status)
         if self._quiet:
             return
         now_s = time.monotonic()
@@ -50,6 +48,17 @@ class LiveLine:
         else:
             self._write(line + "\n")
 
+    def _tell_faults(self, status: dict[str, Any]) -> None:
+        """Tell each new fault; behind the first cause of a stop only what asks for more than it: the rest follows."""
+        first, found = status["first_fault"], dict(zip(status["faults"], status["fault_values"], strict=True))
+        if first:
+            found = {first: status["first_value"]} | {i: found[i] for i in stronger_than(first, list(found))}
+        for fault, value in found.items():
+            if fault not in self._faults:
+                words = fault_words(fault, value, *limit_and_unit(self._rig, fault))
+                self.say(f"{words} -> {status['mode']}")
+        self._faults = tuple(found)
+
     def say(self, text: str) -> None:
         """Print a separate line."""
         if self._terminal and self._width:
@@ -62,6 +71,12 @@ class LiveLine:
         if self._terminal and self._width:
             self._write("\n")
             self._width = 0
+
+    def close(self) -> None:
+        """Release its descriptor; later lines go to stderr as it is. Idempotent."""
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
 
     def _line(self, status: dict[str, Any]) -> str:
         # JSON has no NaN: a figure that is not known yet (no pose so far) is sent as null.
@@ -84,18 +99,35 @@ class LiveLine:
         return (columns or USUAL_COLUMNS) - 1
 
     def _write(self, text: str) -> None:
+        """Write what the terminal or pipe takes now; the rest is lost.
+
+        While the launcher waits for the terminal, it cannot receive the operator's stop.
+        """
         try:
-            if not self._would_block():
+            if self._fd >= 0:
+                os.write(self._fd, text.encode(errors="replace"))
+            elif not self._would_block():
                 sys.stderr.write(text)
                 sys.stderr.flush()
         except (OSError, AttributeError, ValueError):
             return
 
     def _would_block(self) -> bool:
-        """Return whether a write would block now (a stopped terminal, a full pipe); such lines are dropped.
-
-        While the launcher waits for the terminal, it cannot receive the operator's stop.
-        """
+        """Return whether a write would block now."""
         poll = select.poll()
         poll.register(sys.stderr.fileno(), select.POLLOUT)
         return not poll.poll(0)
+
+
+def _without_waiting() -> int:
+    """Return a descriptor of its own on stderr's terminal or pipe, on which nothing waits; -1 where that is neither.
+
+    Setting stderr itself so would also set it so for the shell that shares it.
+    """
+    try:
+        fd = sys.stderr.fileno()
+        if not (os.isatty(fd) or stat.S_ISFIFO(os.fstat(fd).st_mode)):
+            return -1
+        return os.open(f"/proc/self/fd/{fd}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    except (OSError, AttributeError, ValueError):
+        return -1

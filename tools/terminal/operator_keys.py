@@ -19,8 +19,15 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.
 receive no key while the base keeps pushing."""
 
 
+BACKGROUND = (signal.SIGTTOU, signal.SIGTTIN)
+"""They would suspend a launcher in the background (`push run ... &`) as soon as it touches its terminal."""
+
+
 class OperatorKeys:
-    """Calls `on_stop` for a signal or a key, `on_resume` for the key r; restores everything on `close`."""
+    """Calls `on_stop` for a signal or a key, `on_resume` for the key r; restores everything on `close`.
+
+    In the background there are signals only: the keys are the shell's.
+    """
 
     def __init__(self, loop: EventLoop, on_stop: Callable[[], None], on_resume: Callable[[], None]) -> None:
         self._loop = loop
@@ -29,11 +36,12 @@ class OperatorKeys:
         # The pipe first: a signal between the two calls would be lost.
         self._wakeup = signal.set_wakeup_fd(self._pipe[1])
         self._handlers = [signal.signal(number, _note) for number in SIGNALS]
+        self._ignored = [signal.signal(number, signal.SIG_IGN) for number in BACKGROUND]
         loop.add_fd(self._pipe[0], self._on_signal)
         self._terminal: list[Any] | None = None
         self._stdin = -1
         with contextlib.suppress(OSError, ValueError, AttributeError, termios.error):
-            if sys.stdin.isatty():
+            if sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp():
                 self._stdin = sys.stdin.fileno()
                 self._terminal = termios.tcgetattr(self._stdin)
                 tty.setcbreak(self._stdin)
@@ -42,7 +50,7 @@ class OperatorKeys:
     def close(self) -> None:
         """Restore handlers and terminal."""
         signal.set_wakeup_fd(self._wakeup)
-        for number, handler in zip(SIGNALS, self._handlers, strict=True):
+        for number, handler in zip((*SIGNALS, *BACKGROUND), (*self._handlers, *self._ignored), strict=True):
             signal.signal(number, handler)
         self._loop.remove_fd(self._pipe[0])
         for fd in self._pipe:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
-from robot_io.rig.config import RigConfig
-from robot_io.tick import Mode
-from safety.faults import FAULTS
+import msgspec
 
-VERDICTS = {
-    0: "done",
-    1: "error",
-    4: "not ready",
-    5: "safety stop",
-    6: "contact lost",
-    130: "operator stop",
-}
+from robot_io.rig.config import RigConfig
+from safety.faults import FAULTS
+from tools.verdict.evidence import gather
+from tools.verdict.first_cause import FirstFault, fault_words, first_fault, stronger_than
+from tools.verdict.judgement import CONTACT_LOST, DONE, NOT_TRUSTED, OFF_THE_LINE, judge
+from tools.verdict.object_pose import ObjectPose
+from tools.verdict.witness import Witness
 
 
 def summary(
@@ -29,15 +27,26 @@ def summary(
     level: str,
     devices: dict[str, dict[str, int]],
     notes: list[str],
+    witness: Witness,
+    pushed: ObjectPose | None,
 ) -> dict[str, Any]:
-    """Return the summary of a run (schema 1); `figures` is what control reported at its end."""
-    code = figures["exit_code"]
+    """Return the summary of a run (schema 1).
+
+    figures: what control reported at its end. witness: what else is known of the run. pushed: where the object is, as
+    far as that is known.
+    """
+    trust = gather(rig, figures, witness)
+    judged = judge(figures["exit_code"], trust)
     return {
         "schema": 1,
-        "verdict": VERDICTS.get(code, "error"),
-        "exit_code": code,
+        "verdict": judged.verdict,
+        "exit_code": judged.exit_code,
+        "first_fault": msgspec.to_builtins(first_fault(rig, figures)),
+        "trust": msgspec.to_builtins(trust),
         "distance_m": figures["distance_m"],
         "lateral_error_m": figures["lateral_error_m"],
+        "object_lateral_error_m": pushed.lateral_m if pushed else None,
+        "object_turned_rad": pushed.turned_rad if pushed else None,
         "wanted_distance_m": rig.control.distance_m,
         "controller": rig.control.controller,
         "rig": rig.name,
@@ -60,14 +69,18 @@ def summary(
 
 def person_lines(summary: dict[str, Any]) -> list[str]:
     """Return the lines printed for people at the end of a run."""
-    distance, lateral = summary["distance_m"], summary["lateral_error_m"]
-    lines = []
-    if summary["exit_code"] == 0:
-        lines.append(f"pushed {distance:.2f} m, lateral error {lateral:+.3f} m")
+    verdict, where = summary["verdict"], _where(summary)
+    distance_m = summary["distance_m"]
+    against = [item["text"] for item in summary["trust"] if item["says"] == "against"]
+    unknown = [item["text"] for item in summary["trust"] if item["says"] == "unknown"]
+    if verdict == DONE:
+        lines = [f"pushed {distance_m:.2f} m, lateral error {where}"]
+    elif verdict in (OFF_THE_LINE, NOT_TRUSTED):
+        lines = [f"pushed {distance_m:.2f} m, lateral error {where}, but {verdict}: {'; '.join(against)}"]
     else:
-        lines.append(
-            f"{summary['verdict']} after {distance:.2f} m, lateral offset {lateral:+.3f} m: {stop_reason(summary)}"
-        )
+        lines = [f"{verdict} after {distance_m:.2f} m, lateral offset {where}: {stop_reason(summary)}"]
+        lines += [f"against the run: {text}" for text in against]
+    lines += [f"not known: {text}" for text in unknown]
     loop = summary["loop"]
     if "late_p99_ms" in loop:
         lines.append(
@@ -85,14 +98,29 @@ def person_lines(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
+def _where(summary: dict[str, Any]) -> str:
+    """Return the pusher's lateral offset and, where it is known, the object's."""
+    pusher = f"{summary['lateral_error_m']:+.3f} m"
+    if summary["object_lateral_error_m"] is None:
+        return pusher
+    turned = math.degrees(summary["object_turned_rad"])
+    return f"{pusher} (the object: {summary['object_lateral_error_m']:+.3f} m, turned {turned:+.0f} degrees)"
+
+
 def stop_reason(summary: dict[str, Any]) -> str:
-    """Return the faults that ended a run, in words; those that only followed from the stop are left out."""
-    stopping = next((event for event in summary["safety_events"] if event["mode"] in ("STOP", "DEAD")), None)
-    faults = stopping["faults"] if stopping else summary["faults"]
-    reasons = [FAULTS[i].text for i in faults if i in FAULTS and FAULTS[i].mode >= Mode.HOLD]
-    if not reasons and summary["verdict"] == "contact lost":
-        return contact_loss_reason(summary["contact_seen"])
-    return "; ".join(reasons) or summary["verdict"]
+    """Return the first cause of a stop in words, and what asked for more after it; consequences are left out."""
+    if summary["first_fault"] is None:
+        if summary["verdict"] == CONTACT_LOST:
+            return contact_loss_reason(summary["contact_seen"])
+        return str(summary["verdict"])
+    first = FirstFault(**summary["first_fault"])
+    return cause_words(first, summary["faults"])
+
+
+def cause_words(first: FirstFault, faults: list[str]) -> str:
+    """Return the first cause in words, and those of the run's last `faults` that asked for more than it did."""
+    later = [fault_words(fault, None, None, "") for fault in stronger_than(first.id, faults)]
+    return "; then ".join([first.words(), *later])
 
 
 def contact_loss_reason(contact_seen: bool) -> str:

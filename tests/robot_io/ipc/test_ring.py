@@ -125,3 +125,14 @@ def test_two_processes_hammering_lose_and_tear_nothing():
         producer.kill()
         producer.wait()
         ring.close()
+
+
+def test_it_says_what_waits_and_what_was_taken(ring):
+    assert (ring.consumed, ring.unread) == (0, 0)
+    ring.push(1, 1, bytes(8))  # 16 bytes before a payload
+    ring.push(1, 1, bytes(3))
+    assert (ring.consumed, ring.unread) == (0, 48)
+    ring.pop_all(1)
+    assert (ring.consumed, ring.unread) == (24, 24)
+    ring.pop_all()
+    assert (ring.consumed, ring.unread) == (48, 0)

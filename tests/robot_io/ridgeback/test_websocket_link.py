@@ -11,7 +11,8 @@ from websockets.protocol import State
 
 from robot_io.messages import BodyTwist, LinkState
 from robot_io.ridgeback.driver import LINK_STALE_NS, Ridgeback
-from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink, parse_url
+from robot_io.ridgeback.open_socket import parse_url
+from robot_io.ridgeback.websocket_link import LinkLost, WebSocketLink
 
 URL = "ws://127.0.0.1:1"
 TEXT, CONTINUATION, CLOSE, PING = 1, 0, 8, 9

@@ -1,5 +1,6 @@
 """The shipped rigs: their levels, addresses, scene, and the frames that follow from the held pose."""
 
+import json
 import math
 
 import msgspec
@@ -102,3 +103,14 @@ def test_contradictions_are_one_sentence(rig, overrides, words):
 def test_hardware_and_emulated_mix():
     rig = resolve_rig("thing", ["base.level=emulated"])
     assert (rig.ft.level, rig.base.level) == ("hardware", "emulated")
+
+
+@pytest.mark.parametrize("name", ["../../x", "/abs", "a/b", "", ".", "..", "a\nb", "-rf", "x" * 65])
+def test_a_rig_whose_name_is_no_name_is_refused(name):
+    with pytest.raises(ConfigError, match="is not a name"):
+        resolve_rig("emulated", [f"name={json.dumps(name)}"])
+
+
+@pytest.mark.parametrize("name", ["thing", "our lab-2", "paper_gains", "Pr\u00fcfstand 1.5", "x" * 64])
+def test_a_name_may_have_spaces_and_letters_of_any_language(name):
+    assert resolve_rig("emulated", [f"name={json.dumps(name)}"]).name == name

@@ -31,7 +31,8 @@ from tools.report import process as report_process
 from tools.report.page import page, run_mark, write_report
 from tools.report.process import ReportProcess
 from tools.report.run_data import read_run
-from tools.report.run_summary import baseline_of, differences, tiles, verdict
+from tools.report.run_summary import baseline_of, differences, tiles
+from tools.report.run_verdict import verdict
 
 ROOT = Path(__file__).resolve().parents[3]
 EVIL = "<script>alert(1)</script>\"'&$(x) \\frac{ \x1b[31m"
@@ -223,7 +224,7 @@ def test_a_run_that_failed_before_any_contact(ran, ticks, tmp_path):
     write_report(log, tmp_path / "report.html")
     seen = assert_self_contained((tmp_path / "report.html").read_text())
     assert seen.words["h1"] == "Not ready after 0.00 m"
-    assert "The force sensor was not settled while taring" in seen.words["p"]
+    assert "R02 the force sensor was not settled while taring" in seen.words["p"]
     assert "R02" in seen.words["td"]
 
 
@@ -233,13 +234,13 @@ def test_why_a_push_failed_without_and_after_a_contact(ran, ticks, tmp_path, see
     control = replace(last.after.control, contact_seen=seen, phase=int(Phase.FAILED))
     ended = replace(last, after=replace(last.after, control=control), output=replace(last.output, exit_code=6))
     log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), [*ticks[:-1], ended])
-    assert verdict(read_run(log)).why.startswith(why)
+    assert verdict(read_run(log), {}).why.startswith(why)
 
 
 def test_a_log_that_ends_in_the_middle_of_a_push(ran, ticks, tmp_path):
     pushing = [i for i, tick in enumerate(ticks) if tick.after.control.phase == Phase.PUSH]
     log = write_log(tmp_path / "run.mcap", rig_of(ran[0]), ticks[: pushing[len(pushing) // 2]])
-    found = verdict(read_run(log))
+    found = verdict(read_run(log), {})
     assert not found.good
     assert found.line.startswith("Aborted after 0.")
     assert "phase push" in found.why

@@ -114,7 +114,7 @@ def mixed(tmp_path, table, *lines):
 
 def device_fails(state, tmp_path, code, rig):
     """Run a rig whose real device fails at the start."""
-    return push_fails(state, tmp_path, code, rig, "--move-robot", also_plain=False)
+    return push_fails(state, tmp_path, code, rig, "--move-robot", "--drive-blind", also_plain=False)
 
 
 def closed_address():

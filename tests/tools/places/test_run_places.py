@@ -1,10 +1,7 @@
-"""Where runs are kept and locked: folders, the lock of a rig, and what happens when they cannot be used."""
+"""Where runs are kept: folders, and what happens when they cannot be used."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,11 +9,9 @@ import pytest
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.rig.config import load_rig
 from tools.commands import run as run_command
-from tools.places import run_dir
+from tools.places import run_dir, saved_tare
 from tools.places.atomic_file import write_json
-from tools.places.state_dir import RigLock, state_dir
-
-ROOT = Path(__file__).resolve().parents[3]
+from tools.places.state_dir import state_dir
 
 
 @pytest.fixture
@@ -64,42 +59,6 @@ def test_discard_takes_only_what_is_of_the_run(tmp_path):
     assert not tmp_path.exists()
 
 
-HOLDER = """
-import sys
-from tools.places.state_dir import RigLock
-with RigLock(sys.argv[1]):
-    print("held", flush=True)
-    sys.stdin.read()
-"""
-
-
-def test_a_lock_is_held_across_processes_and_freed_by_a_kill(state):
-    holder = subprocess.Popen(
-        [sys.executable, "-c", HOLDER, "my rig/1"],
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
-    with holder:
-        assert holder.stdout.readline() == b"held\n"
-        with pytest.raises(EnvironmentFault, match=f"in use by another run \\(process {holder.pid}\\)") as caught:
-            RigLock("my rig/1")
-        assert caught.value.where == "my rig/1"
-        with RigLock("another"):
-            pass
-        holder.kill()
-        holder.wait()
-        with RigLock("my rig/1"):
-            pass
-
-
-def test_a_lock_that_cannot_be_opened_is_said(state):
-    (state / "mine.lock").mkdir()
-    with pytest.raises(EnvironmentFault, match=r"mine\.lock: the rig's lock cannot be opened"):
-        RigLock("mine")
-
-
 def test_a_state_folder_that_cannot_be_made_is_said(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
@@ -118,6 +77,12 @@ def test_a_tare_that_cannot_be_kept_does_not_take_the_verdict_with_it(state, cap
     }
     run_command.save_tare(rig, figures)
     assert "the tare was not saved" in capsys.readouterr().err
+
+
+def test_what_is_kept_for_later_runs_is_the_users_own(state):
+    saved_tare.save(load_rig("emulated"), (0.0,) * 6, (0.0,) * 6)
+    assert state.stat().st_mode & 0o777 == 0o700
+    assert (state / "emulated.tare.json").stat().st_mode & 0o777 == 0o600
 
 
 def test_a_json_file_that_cannot_be_written_leaves_no_part_of_it(tmp_path):

@@ -13,7 +13,6 @@ import time
 import pytest
 
 from robot_io.rig.config import load_rig
-from safety.faults import FAULTS
 from tools.terminal.live_line import LiveLine
 
 STATUS = {
@@ -26,6 +25,9 @@ STATUS = {
     "theta_p": 0.1,
     "speed": 0.1,
     "faults": [],
+    "fault_values": [],
+    "first_fault": "",
+    "first_value": None,
     "late_ms": 0.1,
 }
 
@@ -56,8 +58,23 @@ def test_a_fault_is_said_in_words_once():
     with stderr_is_a_pipe() as to_pipe:
         live = LiveLine(load_rig("emulated"), quiet=True)
         for _ in range(3):
-            live.show({**STATUS, "faults": ["F01-slow"], "mode": "SLOW"})
-        assert os.read(to_pipe, 65536).decode() == f"F01-slow {FAULTS['F01-slow'].text} -> SLOW\n"
+            live.show({**STATUS, "faults": ["F01-slow"], "fault_values": [62.4], "mode": "SLOW"})
+        said = os.read(to_pipe, 65536).decode()
+        assert said == "F01-slow no force packet for 50 ms: 62.4 ms, limit 50 ms -> SLOW\n"
+
+
+def test_the_first_cause_is_said_with_its_number_and_what_follows_from_it_is_not():
+    stopped = {**STATUS, "mode": "STOP", "first_fault": "F50-stop", "first_value": 163.2}
+    with stderr_is_a_pipe() as to_pipe:
+        live = LiveLine(load_rig("emulated"), quiet=True)
+        live.show({**stopped, "faults": ["F50-stop"], "fault_values": [163.2]})
+        live.show({**stopped, "faults": ["F50-stop", "F31-stop", "F60-late"], "fault_values": [None, 251.0, None]})
+        said = os.read(to_pipe, 65536).decode()
+        assert said == "F50-stop the force is above the limit: 163 N, limit 150 N -> STOP\n"
+        dead = {**stopped, "mode": "DEAD", "faults": ["F50-stop", "F34"], "fault_values": [None, 0.042]}
+        live.show(dead)
+        said = os.read(to_pipe, 65536).decode()
+        assert said == "F34 the base moves although it was told to stop: 0.042 m/s, limit 0.03 m/s -> DEAD\n"
 
 
 def test_a_full_pipe_holds_nobody_up():
@@ -120,6 +137,30 @@ def test_a_stopped_terminal_holds_nobody_up():
     os.close(ours)
 
 
+def test_a_line_longer_than_the_room_left_holds_nobody_up():
+    """A poll says that there is room for a byte; the line may need more."""
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "w") as stderr, contextlib.redirect_stderr(stderr):
+        live = LiveLine(load_rig("emulated"))
+        began_s = time.monotonic()
+        for _ in range(20):
+            live.say("x" * 3000)  # nobody reads
+        assert time.monotonic() - began_s < 2.0
+        live.close()
+        live.close()
+        termios.tcflush(theirs, termios.TCOFLUSH)
+    os.close(ours)
+
+
+def test_a_file_is_written_at_its_end(tmp_path):
+    with (tmp_path / "err").open("w") as stderr, contextlib.redirect_stderr(stderr):
+        print("before", file=stderr, flush=True)
+        live = LiveLine(load_rig("emulated"))
+        live.say("between")
+        print("after", file=stderr, flush=True)
+    assert (tmp_path / "err").read_text() == "before\nbetween\nafter\n"
+
+
 def test_a_closed_terminal_and_none_at_all():
     ours, theirs = pty.openpty()
     stderr = os.fdopen(theirs, "w")
@@ -132,5 +173,5 @@ def test_a_closed_terminal_and_none_at_all():
         stderr.close()  # it could not write either
     with contextlib.redirect_stderr(None):
         none = LiveLine(load_rig("emulated"))
-        none.show({**STATUS, "faults": ["F02"]})
+        none.show({**STATUS, "faults": ["F02"], "fault_values": [None]})
         none.end()

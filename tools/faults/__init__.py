@@ -1,0 +1,1 @@
+"""The fault table, proved: every row brought about, and the reaction measured."""

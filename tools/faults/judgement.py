@@ -1,0 +1,85 @@
+"""Whether a row did what the table promises in a run: named in time, reacted to, and with its exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from robot_io.tick import Mode
+from safety.faults import FAULTS, Fault
+from tools.faults.lockstep_round import LockstepRound, Seen
+from tools.faults.scenario import Scenario
+
+LEAST_REDUCTION_M_PER_S = 1e-6
+
+
+class Proof(NamedTuple):
+    """A proved row: `measured_ticks` is None where no command is to be reduced; `why` says why it did not pass."""
+
+    id: str
+    what: str
+    level: str
+    measured_ticks: int | None
+    bound_ticks: int
+    passed: bool
+    why: str = ""
+    repeats: int = 0
+    """Rounds on the wire that said nothing, because the host stalled."""
+
+
+def judged(scenario: Scenario, found: LockstepRound) -> Proof:
+    """Return what a lockstep run showed of the scenario's row."""
+    row = FAULTS[scenario.row]
+    ticks = found.ticks
+    named = next((i for i, seen in enumerate(ticks) if row.id in seen.faults), None)
+    if _by_the_gate(scenario):
+        named = found.first_bad
+    bad = _first_bad(scenario, found)
+
+    def result(measured: int | None, why: str) -> Proof:
+        return Proof(row.id, scenario.what, "sim", measured, row.bound_ticks, not why, why)
+
+    if bad is None:
+        return result(None, "the fault to inject changed nothing")
+    if named is None:
+        return result(None, f"not named; the run ended with {', '.join(ticks[-1].faults) or 'no fault'}")
+    if named < bad:
+        return result(None, f"named {bad - named} ticks before there was evidence")
+    if row.mode == Mode.SILENT:
+        return result(None, _of_warning(ticks, named))
+    if row.mode >= Mode.HOLD and found.exit_code != row.exit_code:
+        return result(None, f"exit code {found.exit_code} instead of {row.exit_code}")
+    if scenario.standing:
+        return result(None, "the base moved" if any(seen.speed for seen in ticks[named:]) else "")
+    obeyed = _obeyed(row, ticks, named, ticks[bad - 1].speed if bad else 0.0, by_gate=_by_the_gate(scenario))
+    if obeyed is None:
+        return result(None, "no command was reduced")
+    measured = obeyed - bad
+    return result(measured, "" if measured <= row.bound_ticks else "too late")
+
+
+def _by_the_gate(scenario: Scenario) -> bool:
+    return scenario.silent or scenario.dead
+
+
+def _first_bad(scenario: Scenario, found: LockstepRound) -> int | None:
+    if found.first_bad is None:
+        return None
+    begun = next((i for i in range(found.first_bad, len(found.ticks)) if found.ticks[i].begun), None)
+    return None if begun is None else begun + scenario.evidence_ticks
+
+
+def _obeyed(row: Fault, ticks: Sequence[Seen], named: int, before: float, *, by_gate: bool) -> int | None:
+    """Return the first tick, from the one that names the row, whose command is reduced (zero for a STOP)."""
+    for i in range(named, len(ticks)):
+        seen = ticks[i]
+        most = 0.0 if row.mode >= Mode.STOP else before - LEAST_REDUCTION_M_PER_S
+        if (by_gate or seen.mode >= row.mode) and (seen.speed <= most or seen.speed == 0.0):
+            return i
+    return None
+
+
+def _of_warning(ticks: Sequence[Seen], named: int) -> str:
+    """Return what is wrong with a warning: it must not change the mode."""
+    row_mode = max(seen.mode for seen in ticks[named : named + 2])
+    return "" if row_mode <= Mode.PUSHING else f"the mode became {Mode(row_mode).name}"

@@ -1,0 +1,167 @@
+"""A scenario in lockstep: exact to the tick, with the whole world, core and gate of level sim."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+from robot_io.messages import BodyTwist
+from robot_io.rig.config import RigConfig
+from robot_io.tick import ControlTick, Phase, TickInput, TickOutput, TickState
+from tools.faults.scenario import Moment, Scenario, at
+from tools.rig import resolve_rig, with_faults
+from tools.run.lockstep import START_NS, Lockstep
+from tools.run.tick_core import TickCore
+
+SETTINGS = ("control.distance_m=1.0",)
+HALF_A_SECOND = 50
+PERIOD_NS = 10_000_000
+MOST_TICKS = 6000
+"""A scenario that has not ended by then does not end by itself."""
+
+
+class Seen(NamedTuple):
+    """What one tick came to."""
+
+    phase: int
+    speed: float
+    """Of the command that left: control's envelope, or the gate where control is silent."""
+    mode: int
+    faults: tuple[str, ...]
+    begun: bool
+    """Whether the evidence that a row waits for is there."""
+
+
+class LockstepRound(NamedTuple):
+    """A whole run under a scenario: what each tick came to, at which tick the bad input could first be seen."""
+
+    ticks: list[Seen]
+    first_bad: int | None
+    exit_code: int
+
+
+class _NoLog:
+    """Keeps nothing."""
+
+    def record(self, kind: int, time_ns: int, payload: bytes) -> None:
+        """Forget it."""
+
+    def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
+        """Forget it."""
+
+
+class _FaultyCore:
+    """The core with the scenario's facts of the host, and its defects, from a tick on."""
+
+    def __init__(self, core: TickCore, scenario: Scenario, from_tick: int) -> None:
+        self._core = core
+        self._defective = core if scenario.core is None else scenario.core(core)
+        self._alter = scenario.alter
+        self._from = from_tick
+
+    def fold(self, state: TickState, inp: TickInput) -> tuple[TickState, TickOutput]:
+        """Fold one tick."""
+        if inp.tick < self._from:
+            return self._core.fold(state, inp)
+        if self._alter is not None:
+            inp = self._alter(inp, state, inp.tick - self._from)
+        return self._defective.fold(state, inp)
+
+
+class FaultyLockstep(Lockstep):
+    """A lockstep run under a scenario."""
+
+    def __init__(self, rig: RigConfig, seed: int, scenario: Scenario, from_tick: int) -> None:
+        super().__init__(rig, seed, _NoLog())
+        self.safety = self._core.safety
+        self._core = _FaultyCore(self._core, scenario, from_tick)  # type: ignore[assignment]
+        self._scenario = scenario
+        self._from = from_tick
+        self.ticks: list[Seen] = []
+
+    def _finish_tick(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
+        super()._finish_tick(inp, after, output)
+        by_gate = self._scenario.silent or self._scenario.dead
+        command = self._gate.record.sent if by_gate and inp.tick >= self._from else output.command_body
+        begun = self._scenario.begins is None or self._scenario.begins(inp, after)
+        self.ticks.append(Seen(after.control.phase, size(command), output.mode, output.faults, begun))
+        if len(self.ticks) > MOST_TICKS:
+            raise _TooLong
+
+    def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
+        if tick < self._from or not (self._scenario.silent or self._scenario.dead):
+            super()._send(tick, now_ns, output)
+            return
+        if self._scenario.dead and not self._gate.zeros_since_ns:
+            self._gate = self._gate.on_control_gone(now_ns)
+        self._turn_gate(now_ns)
+
+
+def run_lockstep(scenario: Scenario, seed: int = 0) -> LockstepRound:
+    """Run a scenario to its end."""
+    settings = SETTINGS + scenario.settings
+    from_tick = moment_tick(scenario.moment, settings, seed)
+    rig = with_faults(_rig(settings), at(scenario.words, from_tick * PERIOD_NS * 1e-9))
+    one = FaultyLockstep(rig, seed, scenario, from_tick)
+    code = -1
+    try:
+        code = one.run(lambda *_: None)["exit_code"]
+    except _TooLong:
+        pass
+    except _Defect:
+        code = 1
+    first_ns = one.first_injected_ns
+    bad = from_tick if not scenario.words else None if first_ns is None else -(-(first_ns - START_NS) // PERIOD_NS)
+    return LockstepRound(one.ticks, bad, code)
+
+
+class _TooLong(Exception):
+    pass
+
+
+class _Defect(ArithmeticError):
+    """Raised by a scenario's defect in control."""
+
+
+def raise_defect() -> None:
+    """Fail as a defect in control does."""
+    raise _Defect("planted by a scenario")
+
+
+@cache
+def _rig(settings: tuple[str, ...]) -> RigConfig:
+    return resolve_rig("sim", settings)
+
+
+@cache
+def reference(settings: tuple[str, ...], seed: int) -> tuple[Seen, ...]:
+    """Return the ticks of a run without a fault."""
+    ticks: list[Seen] = []
+
+    def on_tick(_inp: TickInput, state: TickState, output: TickOutput) -> None:
+        ticks.append(Seen(state.control.phase, size(output.command_body), output.mode, output.faults, True))
+
+    Lockstep(_rig(settings), seed, _NoLog()).run(on_tick)
+    return tuple(ticks)
+
+
+def moment_tick(moment: Moment, settings: tuple[str, ...], seed: int) -> int:
+    """Return the tick at which a scenario's fault begins, from a run without it."""
+    if moment == Moment.START:
+        return 0
+    ticks, rig = reference(settings, seed), _rig(settings)
+    full = {
+        Moment.APPROACH: (Phase.APPROACH, rig.control.approach_speed_m_per_s),
+        Moment.PUSH: (Phase.PUSH, rig.control.push_speed_m_per_s),
+        Moment.RETREAT: (Phase.RETREAT, 0.0),
+        Moment.END: (Phase.REST, 0.0),
+    }
+    phase, speed = full[moment]
+    found = next(i for i, seen in enumerate(ticks) if seen.phase == phase and seen.speed >= speed - 1e-6)
+    return found + (HALF_A_SECOND if moment in (Moment.APPROACH, Moment.PUSH) else 0)
+
+
+def size(twist: BodyTwist) -> float:
+    """Return the speed of a velocity, m/s."""
+    return math.hypot(twist.vx, twist.vy)

@@ -1,0 +1,116 @@
+"""One scenario (or more) for every row of the fault table, in its order. A row without one fails `push faults --run`.
+
+A new row: one line. Words as after `push run --fault`, without the time; what no device can do, from `alterations`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from robot_io.tick import Phase, TickInput, TickState
+from tools.faults import alterations as do
+from tools.faults.scenario import Moment, Scenario
+
+START, APPROACH, RETREAT, END = Moment.START, Moment.APPROACH, Moment.RETREAT, Moment.END
+PATIENCE_M = 0.5
+EXPECTED_M = 0.05
+"""`path.expected_contact_m` of the shipped rigs."""
+
+
+def far_beyond(inp: TickInput, state: TickState) -> bool:
+    """Return whether the search has gone 0.5 m beyond where contact was expected (F53); the path is along x."""
+    contact_x = inp.base.pose.x + do.shipped().frames.contact_in_base_m[0]
+    return state.control.phase >= Phase.APPROACH and contact_x - state.control.approach_from_m > PATIENCE_M + EXPECTED_M
+
+
+def backward(_inp: TickInput, state: TickState) -> bool:
+    """Return whether the law pushes backward (F56)."""
+    return state.control.backward_ticks > 0
+
+
+def off_by_half(inp: TickInput, _state: TickState) -> bool:
+    """Return whether the base has been seen to be off its command by half the push speed of 0.1 m/s (F33)."""
+    sent, measured = inp.base.sent, inp.base.odometry
+    return math.hypot(measured.vx - sent.vx, measured.vy - sent.vy) > 0.05
+
+
+def told_to_stop(_inp: TickInput, state: TickState) -> bool:
+    """Return whether the command is zero."""
+    return state.safety.zero_since_ns > 0
+
+
+def lost(_inp: TickInput, state: TickState) -> bool:
+    """Return whether contact is lost."""
+    return state.control.phase in (Phase.LOST, Phase.LOST_HOLD)
+
+
+LOST_TICKS = 300
+"""Contact may stay lost for 3 s (F52)."""
+
+SCENARIOS: tuple[Scenario, ...] = (
+    Scenario("R01", "no record of the arm", ("arm.off",), START, standing=True, evidence_ticks=500),
+    Scenario("R02", "the sensor scatters", ("ft.garbage=8",), START, standing=True, evidence_ticks=100),
+    Scenario("R03", "a large weight on the sensor", ("ft.wrong=0,0,-120",), START, standing=True, evidence_ticks=100),
+    Scenario("R04", "the arm is elsewhere", ("arm.wrong=0.06",), START, standing=True),
+    Scenario("R05", "odometry creeps", ("base.odometry.wrong=0.015",), START, standing=True, evidence_ticks=500),
+    Scenario("F01-slow", "silent", ("ft.off",)),
+    Scenario("F01-hold", "silent", ("ft.off",)),
+    Scenario("F01-stop", "silent", ("ft.off",)),
+    Scenario("F02", "unplugged", ("ft.lost",)),
+    Scenario("F06", "frozen", ("ft.frozen",)),
+    *(Scenario("F07", f"axis {axis} at its end", (f"ft.saturated={axis}",)) for axis in range(6)),
+    Scenario("F09", "moved while pushing", ("ft.wrong=6",), RETREAT, standing=True, evidence_ticks=0),
+    Scenario("F10", "not a number", ("ft.garbage",)),
+    *(Scenario("F20-hold", f"joint {i} has moved", (f"arm.wrong={'0,' * i}0.006",)) for i in range(6)),
+    Scenario("F20-stop", "a joint has moved", ("arm.wrong=0.011",)),
+    Scenario("F21", "a joint turns", ("arm.moving=0.03",)),
+    Scenario("F22", "protective stop", ("arm.protective-stop",)),
+    Scenario("F23", "emergency stop", ("arm.emergency-stop",)),
+    Scenario("F24-hold", "silent", ("arm.off",)),
+    Scenario("F24-stop", "silent", ("arm.off",)),
+    Scenario("F24-stop", "link lost", ("arm.lost",)),
+    Scenario("F25-hold", "frozen", ("arm.frozen",)),
+    Scenario("F25-stop", "frozen", ("arm.frozen",)),
+    Scenario("F27", "powered off", ("arm.powered-off",)),
+    Scenario("F27", "may be moved by hand", ("arm.freedrive",)),
+    Scenario("F28", "another program", ("arm.other-program",)),
+    Scenario("F29", "not a number", ("arm.garbage",)),
+    Scenario("F30", "link lost", ("base.command.lost",)),
+    Scenario("F31-hold", "no odometry", ("base.odometry.off",)),
+    Scenario("F31-stop", "no odometry", ("base.odometry.off",)),
+    Scenario("F31-stop", "half-open", ("base.odometry.off", "base.pose.off", "base.status.off")),
+    Scenario("F33", "stands still", ("base.command.ignored",), begins=off_by_half),
+    Scenario("F33", "obeys another", ("base.command.wrong=0,0.08",), begins=off_by_half),
+    Scenario("F34", "drives on after a stop", ("base.command.frozen",), alter=do.operator_stop(5), begins=told_to_stop),
+    Scenario("F35", "three times as fast", ("base.odometry.scaled=3",)),
+    Scenario("F36", "a defect in the speed of approach", core=do.too_fast, moment=APPROACH),
+    Scenario("F38", "stop pressed", ("base.status.e-stop",)),
+    Scenario("F38", "motors off", ("base.status.motors-off",)),
+    Scenario("F39", "odometry creeps", ("base.odometry.wrong=0.015",), END, standing=True, evidence_ticks=500),
+    Scenario("F40-slow", "silent", ("base.pose.off",)),
+    Scenario("F40-stop", "silent", ("base.pose.off",)),
+    Scenario("F41", "half a metre aside", ("base.pose.wrong=0,0.5",)),
+    Scenario("F42", "not usable", ("base.pose.invalid",)),
+    Scenario("F42", "not a number", ("base.pose.garbage",)),
+    Scenario("F44", "turned by 6 degrees", ("base.pose.wrong=0,0,0.105",)),
+    Scenario("F50-slow", "90 N more", ("ft.wrong=0,0,-90",)),
+    Scenario("F50-stop", "140 N more", ("ft.wrong=0,0,-150",)),
+    Scenario("F51", "21 N m", ("ft.wrong=0,0,0,23",)),
+    Scenario("F52", "the object is gone", alter=do.no_contact),
+    Scenario("F52-hold", "the object is gone", alter=do.no_contact, begins=lost, evidence_ticks=LOST_TICKS),
+    Scenario("F53", "nothing there", moment=APPROACH, settings=("world.start.gap_m=1.5",), begins=far_beyond),
+    Scenario("F56", "it pushes from the side", alter=do.pushed_aside(75.0, 15.0), begins=backward),
+    Scenario("F58", "a defect in the law", core=do.without_law),
+    Scenario("F60-late", "one tick skipped", alter=do.host_once(1, skipped=1)),
+    Scenario("F60-slow", "30 ms", alter=do.host_once(1, skipped=3)),
+    Scenario("F60-slow", "three ticks in a row", alter=do.host(skipped=1)),
+    Scenario("F63", "recorder gone", alter=do.host(recorder_alive=False)),
+    Scenario("F64", "stop key", alter=do.operator_stop()),
+    Scenario("F65", "control dead", dead=True),
+    Scenario("F66", "control silent", silent=True),
+    Scenario("F67", "gate gone", alter=do.host(gate_alive=False)),
+    Scenario("F67", "gate latched", alter=do.gate_latched),
+    Scenario("F67-late", "gate frozen", alter=do.no_gate_record),
+    Scenario("F68", "an exception", core=do.failing),
+    Scenario("F69", "the arm's process gone", alter=do.host(arm_alive=False)),
+)

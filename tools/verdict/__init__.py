@@ -1,0 +1,1 @@
+"""What a run is worth: its first cause, the evidence for and against it, and the verdict."""
