@@ -64,9 +64,9 @@ def phase_bounds(rig: RigConfig) -> PhaseBounds:
 def in_words(bounds: PhaseBounds) -> str:
     """Return the bounds as one line for the start of a run."""
     return (
-        f"motion ends by itself after {bounds.approach_m:.2f} m or {bounds.approach_s:.0f} s of approach, "
+        f"of these at most {bounds.approach_m:.2f} m or {bounds.approach_s:.0f} s of approach, "
         f"{bounds.push_m:.2f} m or {bounds.push_s:.0f} s of push, "
-        f"{bounds.retreat_m:.2f} m or {bounds.retreat_s:.0f} s of retreat"
+        f"{bounds.retreat_m:.2f} m or {bounds.retreat_s:.0f} s of retreat (F45, F46)"
     )
 
 

@@ -43,15 +43,6 @@ def check_alone(
         _refuse_others(echoes, where)
 
 
-def silence(topics: list[str], time_s: float, where: str) -> DeviceNotReady:
-    """Return the error for topics on which nothing usable came."""
-    return DeviceNotReady(
-        f"no message on {', '.join(topics)} within {time_s:g} s",
-        where=where,
-        do="Check that its publisher runs (motion capture: is the base seen?) and its name in the rig file",
-    )
-
-
 def in_words(twist: BodyTwist) -> str:
     """Return a velocity for people."""
     return f"{twist.vx:.2f} m/s forward, {twist.vy:.2f} m/s left, {twist.omega:.2f} rad/s"

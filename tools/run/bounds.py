@@ -11,7 +11,7 @@ from robot_io.messages import Pose2D
 from robot_io.polygon import longest_line_m
 from robot_io.rig.config import RigConfig
 from safety.faults import FAULTS
-from safety.motion_bounds import TravelLimits, total_bounds
+from safety.motion_bounds import TravelLimits, in_words, phase_bounds, total_bounds
 from safety.stopping import Stopping, stopping
 from safety.workspace import SPARE_AROUND_M, WorkspaceSettings, room_for_push
 from sim_backend.world.scene import place
@@ -21,10 +21,14 @@ FURTHEST_WITHOUT_WORKSPACE_M = 10.0
 
 
 def bounds_of(rig: RigConfig) -> dict[str, Any]:
-    """Return what bounds a run of this rig: `motion` (m, s), `stopping` (m at m/s), `workspace` (m, WORLD), `pose`."""
+    """Return what bounds a run of this rig.
+
+    `motion`, `phases` (m, s), `stopping` (m at m/s), `workspace` (m, WORLD), `pose`.
+    """
     workspace = WorkspaceSettings.of(rig)
     return {
         "motion": msgspec.to_builtins(total_bounds(rig)),
+        "phases": msgspec.to_builtins(phase_bounds(rig)),
         "stopping": msgspec.to_builtins(stopping(rig, FAULTS.values())),
         "workspace": {
             "given": bool(workspace.given),
@@ -38,7 +42,11 @@ def bounds_of(rig: RigConfig) -> dict[str, Any]:
 
 def bounds_lines(rig: RigConfig) -> list[str]:
     """Return what is said of the bounds at the start of a run."""
-    lines = [_motion_line(total_bounds(rig)), _workspace_line(rig), _stopping_line(stopping(rig, FAULTS.values()))]
+    lines = [
+        f"{_motion_line(total_bounds(rig))}; {in_words(phase_bounds(rig))}",
+        _workspace_line(rig),
+        _stopping_line(stopping(rig, FAULTS.values())),
+    ]
     if rig.base.pose_source == "odometry":
         lines.append("the pose is odometry, so it cannot be checked against it")
     return lines
