@@ -10,8 +10,6 @@ from tests.control.closed_loop import ClosedLoop
 QUIET = (
     "world.sensor.noise_force_N=0",
     "world.sensor.noise_torque_Nm=0",
-    "ft.noise_force_N=0",  # or equal readings would be taken for a frozen sensor
-    "ft.noise_torque_Nm=0",
     "world.start.spread=0",
 )
 SEEDS = range(20)
