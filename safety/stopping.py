@@ -77,6 +77,10 @@ def stopping(rig: RigConfig, faults: Iterable[Fault]) -> Stopping:
     """Return the distances of a rig's run at the fastest speed that it pushes or approaches with."""
     speed = max(rig.control.push_speed_m_per_s, rig.control.approach_speed_m_per_s)
     rows = {fault.id: of_row(fault, speed, rig.limits.max_acceleration_m_per_s2) or 0.0 for fault in faults}
+    for row in rows:
+        held = f"{row.split('-')[0]}-hold"
+        if row.endswith("-stop") and held in rows and row not in _NO_ZERO:
+            rows[row] = min(rows[row], rows[held])  # the base has been held before it is stopped
     slowest = max(rows, key=lambda i: rows[i])
     stop_m = distance_m(speed, TICK_S + WIRE_S + BASE_TICK_S)
     return Stopping(speed, stop_m, alone_m(speed), rows[slowest], slowest)

@@ -100,8 +100,11 @@ class Store:
     def _read(self, index: int) -> Part | None:
         path = self.out / "parts" / f"{index:06d}.npz"
         try:
-            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            raw = path.read_bytes()
+            with np.load(io.BytesIO(raw), allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
+            if _npz(arrays) != raw:  # not the bytes that these arrays were written as, a name for instance
+                return None
             if arrays.pop("mark").tobytes().decode() != self._mark:
                 return None
             return Part(json.loads(arrays.pop("rows").tobytes()), arrays)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
+import pty
 import select
 import socket
 import struct
 import threading
 import time
+import tty
 from pathlib import Path
 
 import pytest
 import serial
 
-from robot_io.errors import DeviceError, DeviceNotReady, DeviceUnreachable
+from robot_io.errors import DeviceError, DeviceNotReady, DeviceProtocolError, DeviceUnreachable
 from robot_io.ft300.driver import Ft300
 from robot_io.messages import LinkState
 from tests.wire.ft300_process import ft300_process, until
@@ -36,6 +39,34 @@ def collect(sensor, count):
 
     assert until(enough), f"only {len(samples)} of {count} samples: {sensor.health()}"
     return samples
+
+
+@contextlib.contextmanager
+def echoing(sensor_port):
+    """Yield a port in front of a sensor's, on which everything that is sent also comes back."""
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    sensor = serial.Serial(sensor_port, 19200, timeout=0)
+    over = threading.Event()
+
+    def pass_on():
+        while not over.is_set():
+            for fd in select.select([ours, sensor.fileno()], [], [], 0.02)[0]:
+                data = os.read(fd, 4096)
+                os.write(ours, data)
+                if fd == ours:
+                    os.write(sensor.fileno(), data)
+
+    thread = threading.Thread(target=pass_on)
+    thread.start()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        over.set()
+        thread.join()
+        sensor.close()
+        os.close(ours)
+        os.close(theirs)
 
 
 @pytest.mark.parametrize("fault", ["corrupt_every", "drop_byte_every", "insert_byte_every", "drop_packet_every"])
@@ -108,6 +139,15 @@ def test_line_dying_while_opening_is_unreachable():
                 Ft300(emulator.port).open()
         finally:
             thread.join()
+
+
+@pytest.mark.parametrize("streaming", [False, True])
+def test_an_adapter_that_echoes_is_named(streaming):
+    """A two-wire RS-485 adapter whose receiver stays on while it sends."""
+    with ft300_process(streaming=streaming) as emulator, echoing(emulator.port) as port:
+        with pytest.raises(DeviceProtocolError, match="echo") as caught:
+            Ft300(port).open()
+        assert "RS-485" in caught.value.do
 
 
 def test_wrong_baud_gives_garbage_and_no_answer():

@@ -47,6 +47,8 @@ def test_a_run_of_another_rig_goes_on(state, tmp_path, host):
         stop = finished(state, "stop", "barrel", "--set", "base.level=emulated", "--json")
         assert stop.last_object["stopped"] == []
         time.sleep(0.5)
+        if run.process.poll() is not None:
+            run.wait()  # raises where the host stopped it
         assert run.process.poll() is None
         run.signal(signal.SIGTERM)
         run.wait(10.0)

@@ -18,8 +18,9 @@ from tools import cli
 from tools.study import items as sweep_items
 from tools.study.engine import run_items
 from tools.study.grid import load_grid
-from tools.study.items import COLUMNS
+from tools.study.items import COLUMNS, Part
 from tools.study.plan import LANE_SOURCES, ROOT
+from tools.study.store import Store
 
 GRID = """
 name = "small"
@@ -143,6 +144,19 @@ def test_a_damaged_part_is_run_again(tmp_path, grid, capsys):
     code, _, _ = push(capsys, grid, "--out", out, "--workers", 1, "--resume")
     assert code == 0
     assert (out / "results.csv").read_bytes() == expected
+
+
+def test_one_changed_byte_anywhere_makes_a_part_unfinished(tmp_path):
+    store = Store(tmp_path, "s", "mark", resume=False)
+    store.save(0, Part([{"a": 1.5}], {"states": np.arange(3.0)}))
+    path = tmp_path / "parts" / "000000.npz"
+    whole = path.read_bytes()
+    assert store.finished(1) == {0}
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x40]) + whole[place + 1 :])
+        assert store.finished(1) == set(), f"byte {place}"
+    path.write_bytes(whole)
+    assert store.finished(1) == {0}
 
 
 def test_a_part_of_another_study_is_run_again(tmp_path, grid, capsys):
