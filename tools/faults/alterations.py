@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 
 from msgspec.structs import replace
 
 from robot_io.rig.config import RigConfig
-from robot_io.tick import Operator, TickInput, TickState
+from robot_io.tick import Operator, Phase, TickInput, TickState
 from safety.gate_shell import GateShell
 from tools.faults.lockstep_round import PERIOD_NS, raise_defect
 from tools.faults.scenario import Alter
@@ -57,6 +58,12 @@ def no_contact(inp: TickInput, state: TickState, _n: int) -> TickInput:
     return _felt(inp, state, (0.0, 0.0, 0.0))
 
 
+def lost_and_resumed(inp: TickInput, state: TickState, n: int) -> TickInput:
+    """Feel nothing, and resume whenever the base holds because of that."""
+    held = state.control.phase == Phase.LOST_HOLD
+    return replace(no_contact(inp, state, n), operator=int(Operator.RESUME if held else Operator.NONE))
+
+
 def pushed_aside(degrees: float, newton: float) -> Alter:
     """Return the alteration in which the object of rig `sim` pushes back from `degrees` off the path."""
     angle, rows = math.radians(degrees), shipped().frames.base_from_sensor
@@ -87,6 +94,11 @@ def no_way_left(gate: GateShell) -> GateShell:
 def no_time_left(gate: GateShell) -> GateShell:
     """Return a gate for which the base has moved for as long as it may."""
     return replace(gate, bounds=replace(gate.bounds, moving_s=gate.travel.moving_ns * 1e-9))
+
+
+def bounded(**bounds: float) -> Callable[[TickCore], TickCore]:
+    """Return what gives a core other bounds on the way and time of its phases."""
+    return lambda core: replace(core, safety=replace(core.safety, phases=replace(core.safety.phases, **bounds)))
 
 
 def without_law(core: TickCore) -> TickCore:

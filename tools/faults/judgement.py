@@ -78,6 +78,6 @@ def _obeyed(row: Fault, ticks: Sequence[Seen], since: int, before: float, *, by_
 
 
 def _of_warning(ticks: Sequence[Seen], named: int) -> str:
-    """Return what is wrong with a warning: it must not change the mode."""
-    row_mode = max(seen.mode for seen in ticks[named : named + 2])
-    return "" if row_mode <= Mode.PUSHING else f"the mode became {Mode(row_mode).name}"
+    """Return what is wrong with a warning: it must not raise the mode."""
+    after, before = ticks[named].mode, ticks[max(named - 1, 0)].mode
+    return "" if after <= max(before, Mode.PUSHING) else f"the mode became {Mode(after).name}"

@@ -10,12 +10,14 @@ from robot_io.messages import BodyTwist
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, Phase, TickInput, TickOutput, TickState
 from tools.faults.scenario import Moment, Scenario, at
+from tools.places.saved_tare import SavedTare
 from tools.rig import resolve_rig, with_faults
 from tools.run.lockstep import START_NS, Lockstep
 from tools.run.tick_core import TickCore
 
 SETTINGS = ("control.distance_m=1.0",)
-HALF_A_SECOND = 50
+LATER = {Moment.APPROACH: 50, Moment.PUSH: 50, Moment.RETREAT: 40, Moment.END: 0}
+"""A fault begins so many ticks after the phase has its full speed, or has begun."""
 PERIOD_NS = 10_000_000
 MOST_TICKS = 6000
 """A scenario that has not ended by then does not end by itself."""
@@ -75,7 +77,7 @@ class FaultyLockstep(Lockstep):
     """A lockstep run under a scenario."""
 
     def __init__(self, rig: RigConfig, seed: int, scenario: Scenario, from_tick: int) -> None:
-        super().__init__(rig, seed, _NoLog())
+        super().__init__(rig, seed, _NoLog(), saved=usual_tare(seed) if scenario.in_contact else None)
         self.safety = self._core.safety
         self._core = _FaultyCore(self._core, scenario, from_tick)  # type: ignore[assignment]
         self._scenario = scenario
@@ -158,6 +160,13 @@ def reference(settings: tuple[str, ...], seed: int) -> tuple[Seen, ...]:
     return tuple(ticks)
 
 
+@cache
+def usual_tare(seed: int) -> SavedTare:
+    """Return the tare of a run without a fault."""
+    found = Lockstep(_rig(SETTINGS), seed, _NoLog()).run(lambda *_: None)
+    return SavedTare((*found["bias_force_N"], *found["bias_torque_Nm"]), tuple(found["held_joints_rad"]), "", 0.0)
+
+
 def moment_tick(moment: Moment, settings: tuple[str, ...], seed: int) -> int:
     """Return the tick at which a scenario's fault begins, from a run without it."""
     if moment == Moment.START:
@@ -171,7 +180,7 @@ def moment_tick(moment: Moment, settings: tuple[str, ...], seed: int) -> int:
     }
     phase, speed = full[moment]
     found = next(i for i, seen in enumerate(ticks) if seen.phase == phase and seen.speed >= speed - 1e-6)
-    return found + (HALF_A_SECOND if moment in (Moment.APPROACH, Moment.PUSH) else 0)
+    return found + LATER[moment]
 
 
 def size(twist: BodyTwist) -> float:

@@ -25,7 +25,7 @@ class Moment(StrEnum):
     PUSH = "push"
     """Half a second into the push at full speed."""
     RETREAT = "retreat"
-    """The first tick of the retreat."""
+    """0.4 s into the retreat."""
     END = "end"
     """The first tick at rest after the push."""
 
@@ -54,6 +54,8 @@ class Scenario(msgspec.Struct, frozen=True):
     """Where the row waits for evidence by design (a distance): whether there is enough of it."""
     evidence_ticks: int = 0
     """Where the row waits for evidence by design (a time): how long."""
+    in_contact: bool = False
+    """The run starts in contact, with the tare of a run without a fault."""
     standing: bool = False
     """The base stands then, so that no command is to be reduced."""
 

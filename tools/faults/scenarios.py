@@ -44,12 +44,33 @@ def lost(_inp: TickInput, state: TickState) -> bool:
     return state.control.phase in (Phase.LOST, Phase.LOST_HOLD)
 
 
+def touching(_inp: TickInput, state: TickState) -> bool:
+    """Return whether the push has begun."""
+    return state.control.phase >= Phase.PUSH
+
+
+def two_cm_on(inp: TickInput, state: TickState) -> bool:
+    """Return whether the approach has gone 2 cm, from which on its direction is judged (F59)."""
+    contact_x = inp.base.pose.x + do.shipped().frames.contact_in_base_m[0]
+    return state.control.phase >= Phase.APPROACH and contact_x - state.control.approach_from_m > 0.02
+
+
 LOST_TICKS = 300
 """Contact may stay lost for 3 s (F52)."""
 
 SCENARIOS: tuple[Scenario, ...] = (
     Scenario("R01", "no record of the arm", ("arm.off",), START, standing=True, evidence_ticks=500),
     Scenario("R02", "the sensor scatters", ("ft.garbage=8",), START, standing=True, evidence_ticks=100),
+    Scenario("R02-dead", "an axis hardly changes", ("ft.dead-axis=1",), START, standing=True),
+    Scenario(
+        "R02-contact",
+        "it pulls",
+        moment=START,
+        alter=do.pushed_aside(180.0, 4.0),
+        standing=True,
+        in_contact=True,
+        settings=("world.start.gap_m=0.0",),
+    ),
     Scenario("R03", "a large weight on the sensor", ("ft.wrong=0,0,-120",), START, standing=True, evidence_ticks=100),
     Scenario("R04", "the arm is elsewhere", ("arm.wrong=0.06",), START, standing=True),
     Scenario("R05", "odometry creeps", ("base.odometry.wrong=0.015",), START, standing=True, evidence_ticks=500),
@@ -60,14 +81,22 @@ SCENARIOS: tuple[Scenario, ...] = (
         standing=True,
         settings=("workspace.x_m=[0.0, 50.0]", "workspace.y_m=[-50.0, 50.0]"),
     ),
+    Scenario("R07", "in millimetres", ("base.pose.wrong=-1500",), START, standing=True),
     Scenario("F01-slow", "silent", ("ft.off",)),
     Scenario("F01-hold", "silent", ("ft.off",)),
     Scenario("F01-stop", "silent", ("ft.off",)),
     Scenario("F02", "unplugged", ("ft.lost",)),
+    Scenario("F04", "half of the packets", ("ft.crc=2",)),
+    Scenario("F06", "one axis", ("ft.dead-axis=1",)),
     Scenario("F06", "frozen", ("ft.frozen",)),
     *(Scenario("F07", f"axis {axis} at its end", (f"ft.saturated={axis}",)) for axis in range(6)),
+    Scenario("F08", "one wild packet", ("ft.spike=96",)),
+    Scenario("F09-before", "drifted", ("ft.wrong=4",), APPROACH),
     Scenario("F09", "moved while pushing", ("ft.wrong=6",), RETREAT, standing=True, evidence_ticks=0),
     Scenario("F10", "not a number", ("ft.garbage",)),
+    Scenario("F11", "it lifts", ("ft.wrong=9",), APPROACH, begins=touching),
+    Scenario("F12-low", "half of the packets", ("ft.slow=50",)),
+    Scenario("F12-hold", "a third of the packets", ("ft.slow=33",)),
     *(Scenario("F20-hold", f"joint {i} has moved", (f"arm.wrong={'0,' * i}0.006",)) for i in range(6)),
     Scenario("F20-stop", "a joint has moved", ("arm.wrong=0.011",)),
     Scenario("F21", "a joint turns", ("arm.moving=0.03",)),
@@ -88,9 +117,13 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F31-stop", "half-open", ("base.odometry.off", "base.pose.off", "base.status.off")),
     Scenario("F33", "stands still", ("base.command.ignored",), begins=off_by_half),
     Scenario("F33", "obeys another", ("base.command.wrong=0,0.08",), begins=off_by_half),
+    Scenario("F33-way", "a quarter too slow", ("base.odometry.scaled=0.75",)),
     Scenario("F34", "drives on after a stop", ("base.command.frozen",), alter=do.operator_stop(5), begins=told_to_stop),
     Scenario("F35", "three times as fast", ("base.odometry.scaled=3",)),
     Scenario("F36", "a defect in the speed of approach", core=do.too_fast, moment=APPROACH),
+    Scenario("F37", "mirrored", ("base.pose.mirrored",)),
+    Scenario("F37", "a third too short", ("base.pose.scaled=0.67",)),
+    Scenario("F37", "drifts", ("base.pose.drifting=0,0.05",)),
     Scenario("F38", "stop pressed", ("base.status.e-stop",)),
     Scenario("F38", "motors off", ("base.status.motors-off",)),
     Scenario("F39", "odometry creeps", ("base.odometry.wrong=0.015",), END, standing=True, evidence_ticks=500),
@@ -99,7 +132,15 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F41", "half a metre aside", ("base.pose.wrong=0,0.5",)),
     Scenario("F42", "not usable", ("base.pose.invalid",)),
     Scenario("F42", "not a number", ("base.pose.garbage",)),
+    Scenario("F43", "frozen", ("base.pose.frozen",)),
+    Scenario("F43", "frozen in the approach", ("base.pose.frozen",), APPROACH),
     Scenario("F44", "turned by 6 degrees", ("base.pose.wrong=0,0,0.105",)),
+    Scenario("F45-approach", "no way left", core=do.bounded(approach_m=0.0), moment=APPROACH),
+    Scenario("F45-push", "no way left", core=do.bounded(push_m=0.0)),
+    Scenario("F45-retreat", "no way left", core=do.bounded(retreat_m=0.0), moment=RETREAT),
+    Scenario("F46-approach", "no time left", core=do.bounded(approach_s=0.0), moment=APPROACH),
+    Scenario("F46-push", "no time left", core=do.bounded(push_s=0.0)),
+    Scenario("F46-retreat", "no time left", core=do.bounded(retreat_s=0.0), moment=RETREAT),
     Scenario("F47", "further than it can need", gate=do.no_way_left),
     Scenario("F48", "longer than it can need", gate=do.no_time_left),
     Scenario("F50-slow", "90 N more", ("ft.wrong=0,0,-90",)),
@@ -107,11 +148,22 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F51", "21 N m", ("ft.wrong=0,0,0,23",)),
     Scenario("F52", "the object is gone", alter=do.no_contact),
     Scenario("F52-hold", "the object is gone", alter=do.no_contact, begins=lost, evidence_ticks=LOST_TICKS),
+    Scenario("F52-refused", "a fourth time", alter=do.lost_and_resumed),
+    Scenario("F53-early", "much too soon", moment=START, settings=("path.expected_contact_m=0.7",)),
     Scenario("F53", "nothing there", moment=APPROACH, settings=("world.start.gap_m=1.5",), begins=far_beyond),
+    Scenario("F54-stop", "against a wall", ("ft.wrong=0,0,-60", "base.pose.frozen")),
+    Scenario(
+        "F54-hold",
+        "four times the usual",
+        ("ft.wrong=0,0,-55",),
+        evidence_ticks=1000,
+        settings=("control.distance_m=3.0",),
+    ),
     Scenario("F55-slow", "drifts aside", ("base.odometry.wrong=0,0.04",), edge_beside_m=0.018),
     Scenario("F55-stop", "drifts aside", ("base.odometry.wrong=0,0.08",), edge_beside_m=0.018),
     Scenario("F56", "it pushes from the side", alter=do.pushed_aside(75.0, 15.0), begins=backward),
     Scenario("F58", "a defect in the law", core=do.without_law),
+    Scenario("F59", "turned by 25 degrees", ("base.pose.turned=25",), START, begins=two_cm_on),
     Scenario("F60-late", "one tick skipped", alter=do.host_once(1, skipped=1)),
     Scenario("F60-slow", "30 ms", alter=do.host_once(1, skipped=3)),
     Scenario("F60-slow", "three ticks in a row", alter=do.host(skipped=1)),
