@@ -6,17 +6,20 @@ import math
 
 from msgspec.structs import replace
 
-from control import open_loop, push_law
+from control import contact_threshold, open_loop, push_law
 from control.sensing import in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
-from control.tare import Judgement, judge
+from control.tare import Judgement, judge, refusal_in_contact
+from control.wrench import force_on_slider_world
 from robot_io.messages import LinkState
 from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Operator, Phase, TareSums, TickInput
 
 FRESH_NS = 100_000_000
 SETTLE_PACKETS = 20
 """Packets needed from each device before the run starts."""
+MOST_RESUMES = 3
+"""After these the operator looks for the cause and starts anew."""
 OVERDUE_CONTACT_M = 0.5
 """Without contact this far beyond the expected place, the object is considered missing."""
 BACKWARD_RAD = math.pi / 2
@@ -36,6 +39,7 @@ def advance(
     if math.isfinite(progress) and math.isfinite(lateral):  # they are not before the first valid pose
         state = replace(state, progress_m=progress, lateral_m=lateral)
     state = _note_rest(state, inp)
+    state = _note_lost(settings, state, inp, held)
     phase = Phase(state.phase)
     if held and phase in (Phase.APPROACH, Phase.PUSH, Phase.LOST):
         return _wait(settings, state, inp)
@@ -77,6 +81,17 @@ def _note_rest(state: ControlState, inp: TickInput) -> ControlState:
     return state if since == state.rest_since_ns else replace(state, rest_since_ns=since)
 
 
+def _note_lost(settings: Settings, state: ControlState, inp: TickInput, held: bool) -> ControlState:
+    """Add up what is travelled without contact, by the measured speed; a base that is held loses nothing."""
+    if state.phase != Phase.LOST or held:
+        return state
+    ticks, twist = 1 + inp.host.skipped, inp.base.odometry
+    speed = math.hypot(twist.vx, twist.vy)
+    gone_m = speed * settings.period_s * ticks if math.isfinite(speed) else 0.0
+    lost_ns = state.lost_ns + round(settings.period_s / S) * ticks
+    return replace(state, lost_ns=lost_ns, lost_m=state.lost_m + gone_m)
+
+
 def _rested(state: ControlState, now_ns: int, for_ns: int) -> bool:
     # Rest counts only from the start of the phase: the base is also at rest before it has started to move.
     return state.rest_since_ns > 0 and now_ns - max(state.rest_since_ns, state.phase_since_ns) >= for_ns
@@ -105,7 +120,7 @@ def _settle(settings: Settings, state: ControlState, inp: TickInput, along: floa
     held = replace(state, held_yaw=inp.base.pose.yaw, approach_from_m=along)
     if settings.in_contact:
         # A saved tare is valid only at the joints where it was taken: those are kept, and a moved arm is a fault (F20).
-        return _enter(held, Phase.APPROACH, inp.now_ns)
+        return _enter(held, Phase.TARE, inp.now_ns)
     return _enter(held, Phase.TARE, inp.now_ns, held_joints=inp.arm.joints.position)
 
 
@@ -115,6 +130,12 @@ def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float)
     if state.refusal or state.tare.count < settings.tare_readings:
         return state
     judged = judge_tare(settings, state)
+    if settings.in_contact:  # the saved tare stays
+        mean = judged.tare.bias[:3]
+        x, y, z = force_on_slider_world(mean, state.bias_force, settings.base_from_sensor, inp.base.pose.yaw)
+        force = (*settings.path.vector_to_path(x, y), z)
+        refusal = refusal_in_contact(state.tare, settings.scatters, force)
+        return replace(state, refusal=int(refusal)) if refusal else _enter(state, Phase.APPROACH, inp.now_ns)
     if judged.refusal:
         return replace(state, refusal=int(judged.refusal))
     bias = judged.tare.bias
@@ -130,8 +151,14 @@ def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float)
 
 
 def _approach(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
-    control = settings.control
-    if state.contact_run >= settings.contact_readings:
+    control, travelled = settings.control, along - state.approach_from_m
+    direction = settings.path.direction_in_world(0.0)
+    # One that is already in contact does not rise.
+    by_mean = contact_threshold.found_by_mean(state.contact, direction, rising=not settings.in_contact)
+    if by_mean or state.contact_run >= settings.contact_readings:
+        expected = settings.expected_contact_m
+        early = not state.contact.overdue and contact_threshold.came_early(travelled, expected)
+        before = contact_threshold.force_before(state.contact, by_mean=by_mean)
         return _enter(
             state,
             Phase.PUSH,
@@ -141,9 +168,13 @@ def _approach(settings: Settings, state: ControlState, inp: TickInput, along: fl
             progress_m=0.0,
             ramp_since_ns=inp.now_ns,
             ramp_from_speed=state.speed,
+            early_contact=early and not settings.in_contact,
+            force_before_contact_N=math.nan if settings.in_contact else before,
         )
-    if along - state.approach_from_m > settings.expected_contact_m + OVERDUE_CONTACT_M:
-        return _enter(state, Phase.LOST_HOLD, inp.now_ns, speed=0.0)
+    state = replace(state, felt_N=contact_threshold.felt(state.contact, direction))
+    if travelled > settings.expected_contact_m + OVERDUE_CONTACT_M:
+        overdue = replace(state.contact, overdue=True)
+        return _enter(state, Phase.LOST_HOLD, inp.now_ns, speed=0.0, contact=overdue)
     elapsed_s = (inp.now_ns - state.phase_since_ns) * S
     return replace(state, speed=approach_speed(elapsed_s, control.approach_speed_m_per_s, control.ramp_s), theta_p=0.0)
 
@@ -162,6 +193,8 @@ def _push(settings: Settings, state: ControlState, inp: TickInput, contact: tupl
         return _without_force(settings, state, inp, contact, speed)
     if state.phase == Phase.LOST:
         state = _enter(state, Phase.PUSH, inp.now_ns)
+    size = math.hypot(state.force_world[0], state.force_world[1])
+    state = replace(state, contact=contact_threshold.learn(state.contact, size, state.progress_m, control.force_min_N))
     force = settings.path.vector_to_path(state.force_world[0], state.force_world[1])
     theta_f = push_law.force_angle(*force)
     if control.controller == "force":
@@ -179,7 +212,15 @@ def _without_force(
 ) -> ControlState:
     control = settings.control
     if state.phase != Phase.LOST:
-        state = _enter(state, Phase.LOST, inp.now_ns, anchor_x=contact[0], anchor_y=contact[1], backward_ticks=0)
+        state = _enter(
+            state,
+            Phase.LOST,
+            inp.now_ns,
+            anchor_x=contact[0],
+            anchor_y=contact[1],
+            backward_ticks=0,
+            lost_count=state.lost_count + 1,
+        )
     gone_s = (inp.now_ns - state.phase_since_ns) * S
     gone_m = math.hypot(contact[0] - state.anchor_x, contact[1] - state.anchor_y)
     if gone_s > control.lost_time_s or gone_m > control.lost_distance_m:
@@ -193,7 +234,10 @@ def _lost_hold(
     settings: Settings, state: ControlState, inp: TickInput, contact: tuple[float, float], along: float
 ) -> ControlState:
     state = replace(state, speed=0.0)
-    if inp.operator == Operator.RESUME:
+    if inp.operator == Operator.RESUME and state.resumes >= MOST_RESUMES:
+        state = replace(state, resume_refused=True)
+    elif inp.operator == Operator.RESUME:
+        state = replace(state, resumes=state.resumes + 1)
         if state.contact_seen:
             return _enter(
                 state,
@@ -247,4 +291,6 @@ def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlSt
 
 def judge_tare(settings: Settings, state: ControlState) -> Judgement:
     """Return the tare of the readings summed so far, judged by the figures that the sensor declares."""
-    return judge(state.tare, settings.sensor_noise, settings.sensor_range, settings.sensor_resolution)
+    return judge(
+        state.tare, settings.sensor_noise, settings.sensor_range, settings.sensor_resolution, settings.scatters
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from control.tare import SMALLEST_COUNT
+from control.tare import SMALLEST_COUNT, Flags6
 from robot_io.geometry import StraightPath
 from robot_io.messages import Vector6
 from robot_io.rig.config import ControlConfig, RigConfig
@@ -42,6 +42,8 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     contact_readings: int
     """How many consecutive readings above the threshold count as contact."""
     in_contact: bool
+    scatters: Flags6 = (True,) * 6
+    """Whether each axis of the sensor scatters at rest, so that one that does not is dead."""
 
     @classmethod
     def of(cls, rig: RigConfig, *, in_contact: bool = False) -> Settings:
@@ -63,4 +65,5 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
             max(SMALLEST_COUNT, round(SETTLE_S * rig.ft.declared.rate_hz)),
             max(1, round(rig.control.contact_samples * rig.ft.declared.rate_hz / CONTACT_RATE_HZ)),
             in_contact,
+            rig.scatters,
         )

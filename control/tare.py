@@ -13,8 +13,8 @@ from enum import IntEnum
 
 import msgspec
 
-from robot_io.messages import Vector6
-from robot_io.tick import TareSums
+from robot_io.messages import Vector3, Vector6
+from robot_io.tick import Counts6, TareSums
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 UNITS = ("N", "N", "N", "N*m", "N*m", "N*m")
@@ -28,6 +28,15 @@ BIAS_SHARE = 0.5
 """A bias above this share of the range leaves too little of it for pushing."""
 SMALLEST_COUNT = 8
 """Fewer samples cannot be split into quarters."""
+DEAD_AT_MOST = 3
+"""An axis with no more distinct values than this over a whole tare is dead, whatever noise its data sheet states."""
+
+PLAUSIBLE_N = 3.0
+"""A force below this says nothing of its direction: a saved tare may be off by so much."""
+VERTICAL_SHARE = 0.5
+"""An object is pressed ahead: up or down it takes less than this share of the horizontal force."""
+
+Flags6 = tuple[bool, bool, bool, bool, bool, bool]
 
 _ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -38,6 +47,9 @@ class Refusal(IntEnum):
     NONE = 0
     UNSETTLED = 1
     SATURATED = 2
+    DEAD = 3
+    IMPLAUSIBLE = 4
+    """Only where the run starts in contact: the force there is none that an object on the path can give."""
 
 
 class Tare(msgspec.Struct, frozen=True, gc=False):
@@ -57,13 +69,17 @@ class Judgement(msgspec.Struct, frozen=True, gc=False):
     do: str = ""
 
 
-def add(sums: TareSums, values: Vector6, wanted: int) -> TareSums:
-    """Return the sums with one more sample; `wanted` is the final number of samples, which determines the quarters."""
+def add(sums: TareSums, values: Vector6, wanted: int, resolution: Vector6) -> TareSums:
+    """Return the sums with one more sample; `wanted` is the final number of samples, which determines the quarters.
+
+    resolution: two values that differ by less than half a step of it are the same one.
+    """
     n, quarter = sums.count, wanted // 4
     origin = sums.origin if n else values
     offset = _minus(values, origin)
     square = _squared(offset)
     early, late = n < quarter, n >= wanted - quarter
+    second, third, distinct = _distinct(sums, values, resolution) if n else (values, values, (1,) * 6)
     return TareSums(
         n + 1,
         origin,
@@ -73,16 +89,49 @@ def add(sums: TareSums, values: Vector6, wanted: int) -> TareSums:
         _plus(sums.first_squares, square) if early else sums.first_squares,
         _plus(sums.last, offset) if late else sums.last,
         _plus(sums.last_squares, square) if late else sums.last_squares,
+        second,
+        third,
+        distinct,
     )
 
 
-def judge(sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vector6) -> Judgement:
+def _distinct(sums: TareSums, values: Vector6, resolution: Vector6) -> tuple[Vector6, Vector6, Counts6]:
+    """Return the second and the third distinct value of each axis, and how many there were: 4 stands for more."""
+    if min(sums.distinct) > DEAD_AT_MOST:
+        return sums.second, sums.third, sums.distinct
+    second, third, distinct = list(sums.second), list(sums.third), list(sums.distinct)
+    for i, value in enumerate(values):
+        count = distinct[i]
+        seen = (sums.origin[i], second[i], third[i])[:count]
+        if count > DEAD_AT_MOST or any(abs(value - one) < resolution[i] / 2 for one in seen):
+            continue
+        if count == 1:
+            second[i] = value
+        elif count == 2:
+            third[i] = value
+        distinct[i] = count + 1
+    a, b, c, d, e, f = distinct
+    return _vector(second), _vector(third), (a, b, c, d, e, f)
+
+
+def dead_axis(sums: TareSums, scatters: Flags6) -> str:
+    """Return the name of the first axis that shows no more than 3 distinct values, "" if there is none.
+
+    scatters: whether the readings of each axis scatter at all; those of a simulated world without noise do not.
+    """
+    return next((AXES[i] for i in range(6) if scatters[i] and sums.distinct[i] <= DEAD_AT_MOST), "")
+
+
+def judge(
+    sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vector6, scatters: Flags6 = (True,) * 6
+) -> Judgement:
     """Return the tare of complete sums (at least SMALLEST_COUNT samples) and whether it can be trusted.
 
     noise, sensor_range, resolution: the sensor's figures per axis (N, N*m); the noise is one standard deviation.
+    scatters: as for `dead_axis`.
     Refused: a reading that is not finite, one that is not steady (standard deviation above twice the noise, or a drift
     from the first to the last quarter beyond 4 standard errors and a small floor), a bias that leaves less than half of
-    the range.
+    the range, an axis that is dead.
     """
     n, quarter = sums.count, sums.count // 4
     moments = [_mean_sd(sums.total[i], sums.squares[i], n) for i in range(6)]
@@ -111,7 +160,26 @@ def judge(sums: TareSums, noise: Vector6, sensor_range: Vector6, resolution: Vec
             what = f"{name} reads {bias[i]:.3g} {unit} at rest, which leaves too little range (limit {limit:g} {unit})"
             do = "Make sure that nothing presses on the tool; power-cycle the sensor"
             return Judgement(result, Refusal.SATURATED, what, do)
+    if dead := dead_axis(sums, scatters):
+        what = f"{dead} shows {sums.distinct[AXES.index(dead)]} distinct values in {n} readings: it measures nothing"
+        return Judgement(result, Refusal.DEAD, what, "Check the sensor and its cable; power-cycle it")
     return Judgement(result)
+
+
+def refusal_in_contact(sums: TareSums, scatters: Flags6, force: Vector3) -> Refusal:
+    """Return why a run that starts in contact is refused: a dead axis, or a force that no object on the path can give.
+
+    scatters: as for `dead_axis`. force: mean force on the slider at rest by the saved tare, N, PATH frame. An object in
+    front of the ball is pressed along the path if at all, and hardly up or down.
+    """
+    if dead_axis(sums, scatters):
+        return Refusal.DEAD
+    level = math.hypot(force[0], force[1])
+    backward = level > PLAUSIBLE_N and force[0] <= 0.0
+    upright = abs(force[2]) > max(PLAUSIBLE_N, VERTICAL_SHARE * level)
+    # An infinite or unknown level compares false here and there.
+    finite = math.isfinite(level) and math.isfinite(force[2])
+    return Refusal.IMPLAUSIBLE if backward or upright or not finite else Refusal.NONE
 
 
 def _mean_sd(total: float, squares: float, n: int) -> tuple[float, float]:

@@ -39,3 +39,21 @@ def low_pass(previous: Vector3, sample: Vector3, dt_s: float, tau_s: float) -> V
         previous[1] + gain * (sample[1] - previous[1]),
         previous[2] + gain * (sample[2] - previous[2]),
     )
+
+
+def median_of_three(first: Vector3, second: Vector3, third: Vector3) -> Vector3:
+    """Return the median of three readings, axis by axis: one wild packet never reaches the law.
+
+    It delays by one packet. Where one of the three is not a number, it is the newest (`third`).
+    """
+    return (
+        _median(first[0], second[0], third[0]),
+        _median(first[1], second[1], third[1]),
+        _median(first[2], second[2], third[2]),
+    )
+
+
+def _median(a: float, b: float, c: float) -> float:
+    if not (a - a == 0.0 and b - b == 0.0 and c - c == 0.0):  # without order there is no median
+        return c
+    return max(min(a, b), min(max(a, b), c))

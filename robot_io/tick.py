@@ -18,6 +18,7 @@ from robot_io.messages import ArmRecord, BaseRecord, BodyTwist, Vector3, Vector6
 Vector4 = tuple[float, float, float, float]
 _ZERO6: Vector6 = (0.0,) * 6
 U32 = Annotated[int, "uint32"]
+Counts6 = tuple[U32, U32, U32, U32, U32, U32]
 
 
 class Phase(IntEnum):
@@ -85,6 +86,11 @@ class TareSums(msgspec.Struct, frozen=True, gc=False):
     first_squares: Vector6 = _ZERO6
     last: Vector6 = _ZERO6
     last_squares: Vector6 = _ZERO6
+    second: Vector6 = _ZERO6
+    third: Vector6 = _ZERO6
+    """The second and the third distinct value of each axis; the first is `origin`."""
+    distinct: Counts6 = (0,) * 6
+    """How many distinct values each axis has shown: 4 means more than 3."""
 
 
 class FtReading(msgspec.Struct, frozen=True, gc=False):
@@ -140,6 +146,29 @@ class TickInput(msgspec.Struct, frozen=True, gc=False):
     base: BaseRecord
 
 
+class ContactState(msgspec.Struct, frozen=True, gc=False):
+    """What control remembers of the force, to tell contact from none: N, WORLD frame where nothing else is said."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/ContactState"
+    packets: int = 0
+    """How many readings the median has seen, at most 2."""
+    before_last: Vector3 = (0.0, 0.0, 0.0)
+    last: Vector3 = (0.0, 0.0, 0.0)
+    """The last two readings, SENSOR frame, bias still in them."""
+    means: tuple[float, ...] = ()
+    """x, y, z of the mean force in each tenth of a second: up to one second, while a contact is sought."""
+    bucket_since_ns: int = 0
+    bucket_total: Vector3 = (0.0, 0.0, 0.0)
+    bucket_count: int = 0
+    """The tenth of a second that is not yet full."""
+    overdue: bool = False
+    """Whether the search has already passed the place where the object was expected."""
+    samples: tuple[float, ...] = ()
+    """Size of the filtered force at each centimetre of the first half metre of contact, N."""
+    lost_below_N: float = 0.0
+    """Below this force the contact is lost; 0 until the object has been felt."""
+
+
 class ControlState(msgspec.Struct, frozen=True, gc=False):
     """What control remembers from tick to tick."""
 
@@ -148,7 +177,7 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     phase_since_ns: int = 0
     tared: bool = False
     refusal: int = 0
-    """Why the tare was refused: 0 not, 1 unsettled, 2 nearly saturated."""
+    """Why the start was refused: 0 not, 1 unsettled, 2 nearly saturated, 3 dead axis, 4 implausible force."""
     bias_force: Vector3 = (0.0, 0.0, 0.0)
     bias_torque: Vector3 = (0.0, 0.0, 0.0)
     tare: TareSums = TareSums()
@@ -191,6 +220,110 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     """Whether the first contact came more than 0.3 m, and half of the way, before it was expected."""
     force_before_contact_N: float = float("nan")
     """Size of the mean force in the half second before the first contact, where it should be 0; NaN before it."""
+    felt_N: float = 0.0
+    """Mean force along the motion over half a second, while a contact is sought."""
+    contact: ContactState = ContactState()
+    resumes: int = 0
+    """How often the operator has resumed the push."""
+    resume_refused: bool = False
+    """Whether a further resume was refused in this rest."""
+
+
+class ForceState(msgspec.Struct, frozen=True, gc=False):
+    """What the checks of the force remember."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/ForceState"
+    crc_fail: int = 0
+    """The sensor's count of damaged packets at the last tick."""
+    damaged_ns: tuple[int, ...] = ()
+    damaged: tuple[int, ...] = ()
+    """When packets were damaged lately, and how many each time."""
+    counted_ns: tuple[int, ...] = ()
+    counted: tuple[int, ...] = ()
+    """The sensor's count of good packets, each tenth of a second of the last one."""
+    axis_runs: Counts6 = (0,) * 6
+    """Equal readings in a row of each axis."""
+    before_last: Vector3 = (0.0, 0.0, 0.0)
+    """The force of the reading before the last one, N, SENSOR frame, bias in it."""
+    wrong_run: int = 0
+    """Readings in a row whose force cannot be that of an object being pushed."""
+    stuck_since_ns: int = 0
+    """Since when it has been watched whether a large force moves anything; 0: it is not."""
+    sent_x: float = 0.0
+    sent_y: float = 0.0
+    """Displacement of the base that was commanded since, m, WORLD frame."""
+    from_x: float = 0.0
+    from_y: float = 0.0
+    """Where the base was then, m, WORLD frame."""
+    high_ns: int = 0
+    """For how long in all the force of this push has been higher than it should be."""
+    histogram: tuple[U32, ...] = ()
+    """How often the force of this push was seen in each newton, from 0 on; all larger ones come last."""
+
+
+class MotionMark(msgspec.Struct, frozen=True, gc=False):
+    """One moment to which a later one is compared: the pose, and the ways that odometry and command add up to.
+
+    m, rad, WORLD frame; both ways are turned by the measured heading.
+    """
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/MotionMark"
+    at_ns: int = 0
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    way_x: float = 0.0
+    way_y: float = 0.0
+    way_yaw: float = 0.0
+    sent_x: float = 0.0
+    sent_y: float = 0.0
+
+
+class MotionState(msgspec.Struct, frozen=True, gc=False):
+    """How far the base has come: by pose, by odometry and by what was sent to it."""
+
+    __ros_name__: ClassVar[str] = "push_msgs/msg/MotionState"
+    group: int = 0
+    """0 before the first motion, 1 approach, 2 push, 3 retreat; what follows counts within it."""
+    at_ns: int = 0
+    sent_m: float = 0.0
+    measured_m: float = 0.0
+    moving_ns: int = 0
+    """Time in motion."""
+    vx: float = 0.0
+    vy: float = 0.0
+    """Smoothed measured velocity, m/s, BODY frame."""
+    measured_ns: int = 0
+    resumes: int = 0
+    """How many of the operator's resumes have been allowed for."""
+    from_x: float = 0.0
+    from_y: float = 0.0
+    """Where the base stood as the group began, m, WORLD frame."""
+    lead_x: float = 0.0
+    lead_y: float = 0.0
+    """Where the directions that control asked for lead from there, m, WORLD frame."""
+    aside_run: int = 0
+    """Consecutive ticks in which the base went elsewhere."""
+    agreed_ns: int = 0
+    """The time up to which the ways below are added up; 0 before the first motion."""
+    pose_ns: int = 0
+    way_x: float = 0.0
+    way_y: float = 0.0
+    way_yaw: float = 0.0
+    sent_x: float = 0.0
+    sent_y: float = 0.0
+    still_x: float = 0.0
+    still_y: float = 0.0
+    """Where the pose last was more than 5 mm from the place before, m, WORLD frame ..."""
+    still_way_x: float = 0.0
+    still_way_y: float = 0.0
+    """... and the way by odometry then."""
+    pose_run: int = 0
+    """Consecutive poses that disagree with odometry."""
+    command_run: int = 0
+    """Consecutive ticks in which odometry disagrees with the command."""
+    marks: tuple[MotionMark, ...] = ()
+    """Oldest first."""
 
 
 class WorkspaceState(msgspec.Struct, frozen=True, gc=False):
@@ -230,6 +363,7 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     """Ticks left in which a pause of the host is not taken for a dead device."""
     last_ft_ns: int = 0
     frozen_run: int = 0
+    """Equal readings in a row of the axis that has repeated itself longest."""
     last_ft_force: Vector3 = (0.0, 0.0, 0.0)
     last_ft_torque: Vector3 = (0.0, 0.0, 0.0)
     arm_packets: int = 0
@@ -252,8 +386,10 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     first_value: float = float("nan")
     """What was measured then, in the row's unit."""
     first_fault_ns: int = 0
+    force: ForceState = ForceState()
     workspace: WorkspaceState = WorkspaceState()
     clock: ClockState = ClockState()
+    motion: MotionState = MotionState()
 
 
 class EnvelopeState(msgspec.Struct, frozen=True, gc=False):

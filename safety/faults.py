@@ -7,10 +7,12 @@ tick at which the fault can be seen to the first reduced or zero command that le
 from __future__ import annotations
 
 from enum import StrEnum
+from operator import attrgetter
 
 import msgspec
 
 from robot_io.tick import Mode
+from safety.fault_advice import advice_of
 from safety.settings import SafetySettings
 
 
@@ -37,6 +39,10 @@ class Fault(msgspec.Struct, frozen=True):
     limit: float | str | None = None
     """Beyond it the row is found: a number in `unit`, or the field of SafetySettings that holds it."""
     unit: str = ""
+    cause: str = ""
+    """Likely causes, for people."""
+    next_step: str = ""
+    """What to do."""
 
 
 def _row(
@@ -50,7 +56,7 @@ def _row(
     limit: float | str | None = None,
     unit: str = "",
 ) -> tuple[str, Fault]:
-    return id_, Fault(id_, text, mode, clears, bound, exit_code, measured, limit, unit)
+    return id_, Fault(id_, text, mode, clears, bound, exit_code, measured, limit, unit, *advice_of(id_))
 
 
 _A, _L = Clears.AUTO, Clears.LATCHED
@@ -71,6 +77,22 @@ FAULTS: dict[str, Fault] = dict(
             unit="ms",
         ),
         _row("R02", "the force sensor was not settled while taring", Mode.STOP, _L, 1, 4),
+        _row(
+            "R02-dead",
+            "an axis of the force sensor measures nothing: it hardly changes while taring",
+            Mode.STOP,
+            _L,
+            1,
+            4,
+        ),
+        _row(
+            "R02-contact",
+            "the force at a start in contact is none that an object on the path can give",
+            Mode.STOP,
+            _L,
+            1,
+            4,
+        ),
         _row("R03", "the force sensor's bias leaves too little range", Mode.STOP, _L, 1, 4),
         _row(
             "R04",
@@ -93,6 +115,17 @@ FAULTS: dict[str, Fault] = dict(
             2,
             measured="room that is left, negative where there is too little",
             limit=0.0,
+            unit="m",
+        ),
+        _row(
+            "R07",
+            "the first pose is not a place in a room",
+            Mode.STOP,
+            _L,
+            1,
+            4,
+            measured="the larger coordinate",
+            limit=1000.0,
             unit="m",
         ),
         _row(
@@ -127,8 +160,18 @@ FAULTS: dict[str, Fault] = dict(
         ),
         _row("F02", "the force sensor's link is gone", Mode.STOP, _L, 2),
         _row(
+            "F04",
+            "one in four packets of the force sensor arrives damaged",
+            Mode.STOP,
+            _L,
+            20,
+            measured="damaged packets within 0.2 s",
+            limit="damaged_packets",
+            unit="packets",
+        ),
+        _row(
             "F06",
-            "the force sensor repeats the same reading while the base moves",
+            "an axis of the force sensor repeats the same reading while the base moves",
             Mode.STOP,
             _L,
             30,
@@ -147,6 +190,16 @@ FAULTS: dict[str, Fault] = dict(
             unit="",
         ),
         _row(
+            "F08",
+            "a single force reading was far from those before and after it: not used by the law",
+            _WARN,
+            _A,
+            0,
+            measured="its distance from the reading before",
+            limit=80.0,
+            unit="N",
+        ),
+        _row(
             "F09",
             "the force sensor does not read zero after the run",
             _WARN,
@@ -156,7 +209,47 @@ FAULTS: dict[str, Fault] = dict(
             limit=5.0,
             unit="N",
         ),
+        _row(
+            "F09-before",
+            "the force sensor did not read zero just before the first contact",
+            _WARN,
+            _A,
+            0,
+            measured="mean force in the half second before",
+            limit=3.0,
+            unit="N",
+        ),
         _row("F10", "the force is not a finite number", Mode.STOP, _L, 1),
+        _row(
+            "F11",
+            "the force does not point along the push: the sensor's sign, axes or frame are wrong",
+            Mode.STOP,
+            _L,
+            20,
+            measured="readings in a row",
+            limit=20.0,
+            unit="readings",
+        ),
+        _row(
+            "F12-low",
+            "the force sensor sends too few packets",
+            _WARN,
+            _A,
+            0,
+            measured="rate over the last second",
+            limit="low_rate",
+            unit="Hz",
+        ),
+        _row(
+            "F12-hold",
+            "the force sensor sends far too few packets",
+            Mode.HOLD,
+            _A,
+            100,
+            measured="rate over the last second",
+            limit="least_rate",
+            unit="Hz",
+        ),
         _row(
             "F20-hold",
             "the arm drifts from its held joints",
@@ -304,12 +397,42 @@ FAULTS: dict[str, Fault] = dict(
             unit="m/s",
         ),
         _row("F36", "the commanded velocity was beyond the envelope and was clamped", _WARN, _A, 0),
+        _row(
+            "F33-way",
+            "odometry does not go the way that is sent to the base",
+            Mode.STOP,
+            _L,
+            300,
+            measured="difference of the ways, as a share of what is allowed",
+            limit=1.0,
+            unit="",
+        ),
+        _row(
+            "F37",
+            "pose and odometry disagree on how the base moves",
+            Mode.STOP,
+            _L,
+            300,
+            measured="difference of the ways, as a share of what is allowed",
+            limit=1.0,
+            unit="",
+        ),
         _row("F38", "the base is stopped by its emergency stop or its motors are off", Mode.STOP, _L, 2),
         _row("F39", "the base did not come to rest within 5 s: its odometry still shows motion", Mode.STOP, _L, 1),
         _row("F40-slow", "the base pose is late", Mode.SLOW, _A, 5, measured="age of the pose", limit=None, unit="ms"),
         _row("F40-stop", "the base pose is lost", Mode.STOP, _L, 12, measured="age of the pose", limit=None, unit="ms"),
         _row("F41", "the base pose jumps", Mode.STOP, _L, 3),
         _row("F42", "the base pose is not a valid number", Mode.STOP, _L, 1),
+        _row(
+            "F43",
+            "the pose stands still while odometry moves",
+            Mode.STOP,
+            _L,
+            150,
+            measured="difference of the ways, as a share of what is allowed",
+            limit=1.0,
+            unit="",
+        ),
         _row(
             "F44",
             "the base has turned away from its heading",
@@ -319,6 +442,66 @@ FAULTS: dict[str, Fault] = dict(
             measured="heading error",
             limit="max_heading_error",
             unit="rad",
+        ),
+        _row(
+            "F45-approach",
+            "the search for contact has travelled further than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="way of this search, as sent or measured",
+            limit="phases.approach_m",
+            unit="m",
+        ),
+        _row(
+            "F45-push",
+            "the push has travelled further than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="way of the push, as sent or measured",
+            limit="phases.push_m",
+            unit="m",
+        ),
+        _row(
+            "F45-retreat",
+            "the retreat has travelled further than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="way of the retreat, as sent or measured",
+            limit="phases.retreat_m",
+            unit="m",
+        ),
+        _row(
+            "F46-approach",
+            "the search for contact takes longer than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="time in motion",
+            limit="phases.approach_s",
+            unit="s",
+        ),
+        _row(
+            "F46-push",
+            "the push takes longer than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="time in motion",
+            limit="phases.push_s",
+            unit="s",
+        ),
+        _row(
+            "F46-retreat",
+            "the retreat takes longer than it can need",
+            Mode.STOP,
+            _L,
+            1,
+            measured="time in motion",
+            limit="phases.retreat_s",
+            unit="s",
         ),
         _row(
             "F47",
@@ -372,7 +555,48 @@ FAULTS: dict[str, Fault] = dict(
         ),
         _row("F52", "the contact force is lost: turning back", _WARN, _A, 0, 6),
         _row("F52-hold", "the contact force stays lost", Mode.HOLD, _A, 1, 6),
-        _row("F53", "no contact within 0.5 m of where it was expected", Mode.HOLD, _A, 1, 6),
+        _row(
+            "F52-refused",
+            "a further resume was refused: look for the cause and start a new push",
+            Mode.HOLD,
+            _A,
+            1,
+            6,
+            measured="resumes of this push",
+            limit=3.0,
+            unit="",
+        ),
+        _row(
+            "F53",
+            "no contact within 0.5 m of where it was expected",
+            Mode.HOLD,
+            _A,
+            1,
+            6,
+            measured="mean force along the motion",
+            limit=2.5,
+            unit="N",
+        ),
+        _row("F53-early", "contact came long before it was expected", _WARN, _A, 0),
+        _row(
+            "F54-stop",
+            "the object is stuck: a large force moves nothing",
+            Mode.STOP,
+            _L,
+            100,
+            measured="share of the commanded way that was covered",
+            limit=0.25,
+        ),
+        _row(
+            "F54-hold",
+            "the force has been much too high for 10 s in all",
+            Mode.HOLD,
+            _L,
+            1,
+            measured="time with such a force",
+            limit=10.0,
+            unit="s",
+        ),
         _row(
             "F55-slow",
             "the base or the object comes near the edge of the workspace",
@@ -404,6 +628,16 @@ FAULTS: dict[str, Fault] = dict(
             unit="ticks",
         ),
         _row("F58", "the law returned a direction that is not a number", Mode.STOP, _L, 1),
+        _row(
+            "F59",
+            "the base does not move in the direction that was asked for",
+            Mode.STOP,
+            _L,
+            100,
+            measured="angle between the way by pose and the way asked for",
+            limit=15.0,
+            unit="degrees",
+        ),
         _row("F60-late", "ticks of the loop were skipped", _WARN, _A, 0),
         _row(
             "F60-slow",
@@ -477,7 +711,7 @@ FAULTS: dict[str, Fault] = dict(
 
 def limit_of(fault: Fault, settings: SafetySettings) -> float | None:
     """Return the limit of a row in its unit, None where it has none or it depends on the moment."""
-    return getattr(settings, fault.limit) if isinstance(fault.limit, str) else fault.limit
+    return float(attrgetter(fault.limit)(settings)) if isinstance(fault.limit, str) else fault.limit
 
 
 def strongest(ids: tuple[str, ...]) -> Mode:

@@ -27,10 +27,9 @@ def check(
 ) -> tuple[SafetyState, list[str]]:
     """Return the state and the active faults of the sensor."""
     faults: list[str] = []
-    last_ns, force, torque, run = state.last_ft_ns, state.last_ft_force, state.last_ft_torque, state.frozen_run
+    last_ns, force, torque = state.last_ft_ns, state.last_ft_force, state.last_ft_torque
     for reading in inp.ft.readings:
         last_ns = max(last_ns, reading.received_ns)
-        run = run + 1 if reading.force == force and reading.torque == torque else 0
         force, torque = reading.force, reading.torque
         faults += _of_reading(settings, force, torque, control)
     if inp.ft.link == LinkState.LOST:
@@ -42,9 +41,7 @@ def check(
         faults.append(Finding("F01-hold", age_ns / NS_PER_MS))
     elif age_ns > STALE_SLOW_NS:
         faults.append(Finding("F01-slow", age_ns / NS_PER_MS))
-    if settings.noise_floor and run >= settings.frozen_readings and control.speed > 0.0:
-        faults.append(Finding("F06", run))
-    return replace(state, last_ft_ns=last_ns, last_ft_force=force, last_ft_torque=torque, frozen_run=run), faults
+    return replace(state, last_ft_ns=last_ns, last_ft_force=force, last_ft_torque=torque), faults
 
 
 def _of_reading(

@@ -7,16 +7,23 @@ import math
 import msgspec
 
 from robot_io.messages import Joints, Vector6
-from robot_io.rig.config import FtConfig, RigConfig
+from robot_io.rig.config import RigConfig
+from robot_io.rig.types import Matrix3
 from safety.envelope import EnvelopeLimits
 from safety.limits import MAX_TURN_RATE_RAD_PER_S, speed_limit_m_per_s
-from safety.motion_bounds import total_bounds
+from safety.motion_bounds import PhaseBounds, phase_bounds, total_bounds
 from safety.workspace import WorkspaceSettings
 
 SATURATED = 0.95
 """Share of the sensor's range."""
 FROZEN_S = 0.3
 """Readings that stay equal for this long, at the sensor's declared rate, are a fault."""
+
+DAMAGED_S = 0.2
+DAMAGED_SHARE = 0.25
+"""One in four packets damaged over this time, at the sensor's declared rate: the line is bad, not the packet."""
+LOW_RATE_SHARE, LEAST_RATE_SHARE = 0.55, 0.4
+"""Shares of the sensor's declared rate: the authors of the paper saw 63 of 100 Hz arrive."""
 
 
 class SafetySettings(msgspec.Struct, frozen=True, gc=False):
@@ -30,8 +37,10 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     """Readings at or above which an axis counts as saturated: N, N*m."""
     frozen_readings: int
     """This many consecutive equal readings are a fault."""
-    noise_floor: bool
-    """Whether the sensor's readings are noisy enough that equal ones are a fault."""
+    scatters: tuple[bool, bool, bool, bool, bool, bool]
+    """Whether the readings of each axis scatter, so that equal ones are a fault."""
+    same: Vector6
+    """Two readings closer than this are equal: N, N*m."""
     held_pose: Joints
     """Where the arm must be, rad: the frames of the rig are given for this pose."""
     held_pose_tolerance: float
@@ -42,10 +51,19 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     pose_period_ns: int
     push_speed: float
     envelope: EnvelopeLimits
+    damaged_packets: int
+    """This many damaged packets within the window of F04 are a fault."""
+    low_rate: float
+    least_rate: float
+    """Rates of the sensor below which it is told, and at which the base is held, Hz."""
+    base_from_sensor: Matrix3
     total_travel: float
     total_moving: float
     """What the whole run can need, m and s; the gate latches beyond it."""
     workspace: WorkspaceSettings
+    phases: PhaseBounds
+    pose_is_odometry: bool
+    """Whether the pose is counted by the wheels, so that odometry cannot speak against it."""
 
     @classmethod
     def of(cls, rig: RigConfig) -> SafetySettings:
@@ -62,7 +80,8 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
             limits.max_torque_Nm,
             (fx * SATURATED, fy * SATURATED, fz * SATURATED, mx * SATURATED, my * SATURATED, mz * SATURATED),
             round(FROZEN_S * rig.ft.declared.rate_hz),
-            _scatters(rig.ft),
+            rig.scatters,
+            _half(rig.ft.declared.resolution),
             rig.arm.held_pose_rad,
             rig.arm.held_pose_tolerance_rad,
             limits.drift_hold_rad,
@@ -80,17 +99,18 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
                 contact_x,
                 contact_y,
             ),
+            math.ceil(DAMAGED_SHARE * DAMAGED_S * rig.ft.declared.rate_hz),
+            LOW_RATE_SHARE * rig.ft.declared.rate_hz,
+            LEAST_RATE_SHARE * rig.ft.declared.rate_hz,
+            rig.frames.base_from_sensor,
             bounds.distance_m,
             bounds.moving_s,
             WorkspaceSettings.of(rig),
+            phase_bounds(rig),
+            rig.base.pose_source == "odometry",
         )
 
 
-def _scatters(ft: FtConfig) -> bool:
-    """Return whether 30 consecutive equal readings cannot be chance.
-
-    They cannot where the noise of an axis is at least one step of its resolution: then at most 0.38 of the readings
-    have the most frequent value, and 0.38^30 is 3e-13. With half a step it is 1e-5, a false stop every hour.
-    """
-    axes = zip(ft.noise, ft.declared.resolution, strict=True)
-    return ft.noise_force_N != 0.0 and any(noise >= step for noise, step in axes)
+def _half(steps: Vector6) -> Vector6:
+    a, b, c, d, e, f = steps
+    return a / 2, b / 2, c / 2, d / 2, e / 2, f / 2

@@ -14,12 +14,16 @@ from msgspec.structs import replace
 from robot_io.messages import BodyTwist
 from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Mode, Phase, SafetyState, TickInput
 from safety import (
+    agreement_checks,
     arm_checks,
     base_checks,
     clock_checks,
+    force_checks,
     host_checks,
     link_checks,
+    motion_checks,
     sensor_checks,
+    stuck_checks,
     task_checks,
     workspace_checks,
 )
@@ -125,8 +129,13 @@ def _gather(
     if clamped:
         faults.append("F36")
     if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has sent no data is not a fault
-        return sensor_checks.note(state, inp), faults
-    for check in (sensor_checks.check, arm_checks.check, base_checks.check, link_checks.check, workspace_checks.check):
+        return force_checks.note(sensor_checks.note(state, inp), inp), faults
+    # The force first: it compares with the last reading, on which the sensor's check moves on.
+    checks = (
+        *(force_checks, sensor_checks, stuck_checks, arm_checks),
+        *(base_checks, link_checks, motion_checks, agreement_checks, workspace_checks),
+    )
+    for check in (module.check for module in checks):
         state, found = check(settings, state, inp, control)
         faults += found
     return state, faults

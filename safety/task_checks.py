@@ -16,7 +16,7 @@ BACKWARD_TICKS = 20
 RESIDUAL_N = 5.0
 """The smallest meaningful force according to the sensor's product sheet."""
 
-_REFUSALS = {1: "R02", 2: "R03"}
+_REFUSALS = {1: "R02", 2: "R03", 3: "R02-dead", 4: "R02-contact"}
 
 
 def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: int) -> list[str]:
@@ -35,7 +35,9 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
     if phase == Phase.LOST:
         faults.append("F52")
     if phase == Phase.LOST_HOLD:
-        faults.append("F52-hold" if control.contact_seen else "F53")
+        faults.append("F52-hold" if control.contact_seen else Finding("F53", control.felt_N))
+    if control.resume_refused:
+        faults.append(Finding("F52-refused", control.resumes))
     if control.backward_ticks >= BACKWARD_TICKS:
         faults.append(Finding("F56", control.backward_ticks))
     if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):

@@ -21,7 +21,7 @@ from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
-from robot_io.rig.task import GoalConfig, WorkspaceConfig
+from robot_io.rig.task import FaultsConfig, GoalConfig, WorkspaceConfig
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
 from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
@@ -193,13 +193,6 @@ class LimitsConfig(Table, frozen=True):
     """... and at which it stops (F20)."""
 
 
-class FaultsConfig(Table, frozen=True):
-    """Faults to inject at levels sim and emulated, for rehearsals and tests (docs/faults.md)."""
-
-    inject: tuple[str, ...] = ()
-    """Each `DEVICE.KIND[=VALUE] at T s [for T s]`, as after `push run --fault`."""
-
-
 class RigConfig(Table, frozen=True):
     """One robot, real or not: its devices, frames, path, gains, limits and, where simulated, its world."""
 
@@ -218,6 +211,17 @@ class RigConfig(Table, frozen=True):
     goal: GoalConfig = GoalConfig()
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()
+
+    @property
+    def scatters(self) -> tuple[bool, bool, bool, bool, bool, bool]:
+        """Whether each axis of the sensor scatters at rest: all do, but those of a simulated one without noise.
+
+        A real sensor is never exempt, whatever noise its data sheet or this file states.
+        """
+        hardware = self.ft.level == "hardware"
+        force = hardware or self.world.sensor.noise_force_N > 0.0
+        torque = hardware or self.world.sensor.noise_torque_Nm > 0.0
+        return force, force, force, torque, torque, torque
 
 
 def shipped_rigs() -> list[str]:

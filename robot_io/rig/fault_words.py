@@ -36,14 +36,14 @@ class FaultKind(msgspec.Struct, frozen=True):
     """Every number of a value is greater than this."""
 
 
-def _any_stream(numbers: int, meaning: str) -> dict[str, FaultKind]:
+def _any_stream(numbers: int, meaning: str, scaled: str = "all numbers are =N times as large") -> dict[str, FaultKind]:
     """Return the kinds that every stream of samples has; `meaning` says what its numbers are."""
     return {
         "off": FaultKind("nothing arrives"),
         "frozen": FaultKind("the first sample is repeated, with new times"),
         "garbage": FaultKind("no number is a number; with =N, random ones up to N", (math.nan,)),
         "wrong": FaultKind(f"=N,... is added to {meaning}", (1.0,), numbers),
-        "scaled": FaultKind("=N times as much (a pose: its way from where it was)", (2.0,)),
+        "scaled": FaultKind(scaled, (2.0,)),
         "slow": FaultKind("=N samples a second pass", (10.0,), above=0.0),
         "delayed": FaultKind("everything arrives =N s later", (0.2,), above=0.0),
         "intermittent": FaultKind("nothing arrives in the first half of every =N s", (0.4,), above=0.0),
@@ -73,7 +73,7 @@ KINDS: dict[str, dict[str, FaultKind]] = {
         "other-program": FaultKind("another program runs on the arm"),
         "lost": FaultKind("the link is gone"),
     },
-    "base.pose": _any_stream(3, "x, y (m) and yaw (rad), WORLD frame")
+    "base.pose": _any_stream(3, "x, y (m) and yaw (rad), WORLD frame", "its way from where it was is =N times as long")
     | {
         "mirrored": FaultKind("its way from where it was has the opposite sign"),
         "turned": FaultKind("its way from where it was is turned by =N degrees", (90.0,)),

@@ -38,7 +38,7 @@ RENAMED = (
     Renamed("limits.hold_stop_rad", "limits.drift_stop_rad", 1),
 )
 RETIRED = (Retired("base.odometry_rate_hz", 1),)
-EARLIER_DEFAULTS: tuple[EarlierDefault, ...] = ()
+EARLIER_DEFAULTS: tuple[EarlierDefault, ...] = (EarlierDefault("world.slip", 0.0, 2),)
 
 
 def advice(key: str) -> str:

@@ -1,4 +1,4 @@
-"""Where a push may go and what counts as reached: `[workspace]` and `[goal]` of a rig file."""
+"""Where a push may go, what counts as reached, and what goes wrong on demand: `[workspace]`, `[goal]`, `[faults]`."""
 
 from __future__ import annotations
 
@@ -57,3 +57,10 @@ class GoalConfig(Table, frozen=True):
     """How far the ball may be from the path at any time of the push, to either side."""
     end_tolerance_m: Annotated[float, Meta(gt=0, le=10)] = 0.3
     """How far it may be at the end. A push that starts further off may end as far off as it started."""
+
+
+class FaultsConfig(Table, frozen=True):
+    """Faults to inject at levels sim and emulated, for rehearsals and tests (docs/faults.md)."""
+
+    inject: tuple[str, ...] = ()
+    """Each `DEVICE.KIND[=VALUE] at T s [for T s]`, as after `push run --fault`."""

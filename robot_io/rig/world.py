@@ -90,3 +90,14 @@ class WorldConfig(Table, frozen=True):
     """Relative error of the base's clock (0.0001: 25.0025 Hz)."""
     base_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.53
     mocap_rate_hz: Annotated[float, Meta(ge=5, le=200)] = 100.007
+    slip: Annotated[float, Meta(ge=0, le=0.1)] = 0.03
+    """Share of the wheels' way that does not reach the floor (turning does not slip): an assumption, because the
+    rollers of mecanum wheels always slide a little."""
+    odometry_noise_m_per_s: Annotated[float, Meta(ge=0, le=0.1)] = 0.01
+    """Noise of the measured velocity while the wheels turn (1 sigma; the turn rate's follows from the wheels' places).
+    An assumption; the controller of such wheels states 0.03 (a variance of 0.001) in its messages."""
+    mocap_noise_m: Annotated[float, Meta(ge=0, le=0.01)] = 0.0005
+    """Noise of motion capture, each coordinate (1 sigma): measured on a Vicon, 0.15 mm at rest and below 2 mm in
+    motion (Merriaux et al., Sensors 17, 1591, 2017)."""
+    mocap_noise_deg: Annotated[float, Meta(ge=0, le=2)] = 0.2
+    """The same of the heading: 0.5 mm at markers 0.15 m from their middle."""

@@ -110,8 +110,9 @@ class Flow(Generic[T]):
         if word.kind == "off":
             return False
         if word.kind == "intermittent":
-            since_s = self._progress.elapsed_s(at_ns) - word.at_s
-            return since_s % word.value[0] >= word.value[0] / 2
+            period_ns = round(word.value[0] * NS_PER_S)
+            since_ns = round((self._progress.elapsed_s(at_ns) - word.at_s) * NS_PER_S)
+            return since_ns % period_ns >= period_ns / 2
         if at_ns < self._next_ns:
             return False
         self._next_ns = at_ns + round(NS_PER_S / word.value[0])

@@ -12,6 +12,7 @@ from robot_io.clock import NS_PER_S
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.messages import Pose2D
 from sim_backend.ridgeback.feeds import FeedWriter
+from sim_backend.ridgeback.noise import FeedNoise
 from sim_backend.ridgeback.ros_graph import Message, RosGraph
 from sim_backend.ridgeback.settings import RidgebackSettings
 from sim_backend.world.plant import BaseSource
@@ -32,6 +33,7 @@ class MotionCapture:
         self._loop, self._graph, self._writer, self._source = loop, graph, writer, source
         self._settings = settings
         self._jitter = random.Random(1)
+        self._base_noise, self._slider_noise = FeedNoise(settings, "base"), FeedNoise(settings, "slider")
         self.offset = Pose2D()
         """Offset added to the measured pose of the base (a pose jump): m, m, rad."""
         self.base_hidden_until_ns = 0
@@ -58,7 +60,7 @@ class MotionCapture:
         if t_ns >= self.base_hidden_until_ns:
             messages += self._base(t_ns)
         if t_ns >= self.slider_hidden_until_ns and self._graph.wanted(settings.slider_topic):
-            slider = self._source.read_slider(t_ns)
+            slider = self._slider_noise.pose(self._source.read_slider(t_ns))
             messages.append((settings.slider_topic, self._writer.transform(settings.slider_topic, slider, t_ns)))
         late_s = settings.mocap_latency_s + self._jitter.random() * settings.mocap_jitter_s
         if messages:
@@ -70,7 +72,8 @@ class MotionCapture:
         if not wanted:
             return []
         truth = self._source.read_base(t_ns)
-        seen = Pose2D(truth.pose.x + self.offset.x, truth.pose.y + self.offset.y, truth.pose.yaw + self.offset.yaw)
+        pose, offset = self._base_noise.pose(truth.pose), self.offset
+        seen = Pose2D(pose.x + offset.x, pose.y + offset.y, pose.yaw + offset.yaw)
         return [
             (name, self._writer.base_transform(name, seen, t_ns))
             if name == topics.base_pose

@@ -13,6 +13,7 @@ from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
 from robot_io.messages import BaseStatus, BodyTwist
 from sim_backend.ridgeback.feeds import FeedWriter, seen_from, twist_of
+from sim_backend.ridgeback.noise import FeedNoise
 from sim_backend.ridgeback.ros_graph import Message, RosGraph
 from sim_backend.ridgeback.settings import RidgebackSettings
 from sim_backend.ridgeback.twist_mux import JOYSTICK, LOCK_TOPIC, STOCK_INPUTS, TwistMux
@@ -42,7 +43,8 @@ class RidgebackNodes:
         self._graph, self._writer, self._source = graph, writer, source
         self._topics = topics = settings.topics
         self._start_ns = start_ns
-        self._origin = source.read_base(start_ns).pose
+        self._origin = source.read_base(start_ns).rolled
+        self._noise = FeedNoise(settings, "odometry")
         self._mux = TwistMux()
         self.status = BaseStatus(stop_engaged=False, drivers_active=True, battery_v=settings.battery_v)
         self.commands_forwarded = 0
@@ -135,7 +137,8 @@ class RidgebackNodes:
     def _odometry(self, name: str, t_ns: int) -> None:
         if self._graph.wanted(name):
             truth = self._source.read_base(t_ns)
-            message = self._writer.odometry(name, seen_from(self._origin, truth.pose), truth.twist, t_ns)
+            pose, twist = seen_from(self._origin, truth.rolled), self._noise.twist(truth.twist)
+            message = self._writer.odometry(name, pose, twist, t_ns)
             self._graph.publish(self._graph.topics[name], message)
 
     def _status_tick(self, t_ns: int) -> None:

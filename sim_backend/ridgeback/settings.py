@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 
 from robot_io.rig.config import RigConfig
@@ -25,6 +27,12 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
     base_from_marker: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """x (m), y (m), yaw (rad) of the marker frame in the BODY frame."""
     battery_v: float = 26.2
+    mocap_noise_m: float = 0.0
+    """1 sigma, as the two below."""
+    mocap_noise_rad: float = 0.0
+    odometry_noise_m_per_s: float = 0.0
+    seed: int = 0
+    """Of the noise."""
 
     @property
     def slider_topic(self) -> str:
@@ -41,14 +49,18 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
         return msgspec.structs.replace(self, topics=msgspec.structs.replace(self.topics, **names))
 
 
-def ridgeback_settings(rig: RigConfig) -> RidgebackSettings:
-    """Return how the rig's emulated or simulated base behaves."""
+def ridgeback_settings(rig: RigConfig, seed: int) -> RidgebackSettings:
+    """Return how the rig's emulated or simulated base behaves; each seed has its own noise."""
     return RidgebackSettings(
         topics=rig.base.topics,
         mocap_rate_hz=rig.world.mocap_rate_hz,
         base_phase=rig.world.base_phase,
         base_rate_error=rig.world.base_tick_rate_error,
         base_from_marker=rig.frames.base_from_marker,
+        mocap_noise_m=rig.world.mocap_noise_m,
+        mocap_noise_rad=math.radians(rig.world.mocap_noise_deg),
+        odometry_noise_m_per_s=rig.world.odometry_noise_m_per_s,
+        seed=seed,
     )
 
 

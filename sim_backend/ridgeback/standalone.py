@@ -23,7 +23,7 @@ class StandaloneBase:
     def read_base(self, t_ns: int) -> BaseTruth:
         """Return pose and velocity at `t_ns`."""
         self.plant.step_to(t_ns)
-        return BaseTruth(self.plant.pose, self.plant.velocity)
+        return BaseTruth(self.plant.pose, self.plant.velocity, self.plant.rolled)
 
     def read_slider(self, t_ns: int) -> Pose2D:
         """Return the object's pose."""

@@ -30,6 +30,7 @@ from robot_io.messages import (
     Stamped,
 )
 from sim_backend.ridgeback.feeds import seen_from
+from sim_backend.ridgeback.noise import FeedNoise
 from sim_backend.ridgeback.settings import RidgebackSettings
 from sim_backend.world.plant import BaseSource
 
@@ -68,6 +69,8 @@ class SimRidgeback(DriverBase):
         self._seq: Counter[str] = Counter()
         self._coming: list[Stamped[BaseFeed]] = []
         self._origin = Pose2D()
+        self._base_noise, self._slider_noise = FeedNoise(settings, "base"), FeedNoise(settings, "slider")
+        self._odometry_noise = FeedNoise(settings, "odometry")
         self.newest_inbound_ns = 0
         self.newest_pong_ns = 0
         self.sent_ns = 0
@@ -83,7 +86,7 @@ class SimRidgeback(DriverBase):
             raise DeviceNotReady("it is not open", where="ridgeback sim", do="Open it first")
         now_ns = self._clock()
         settings = self._settings
-        self._origin = self._source.read_base(now_ns).pose
+        self._origin = self._source.read_base(now_ns).rolled
         mocap_ns = round(settings.mocap_latency_s * NS_PER_S)
         speed_up = 1.0 + settings.base_rate_error
         self._feeds = {
@@ -145,16 +148,19 @@ class SimRidgeback(DriverBase):
             status = BaseStatus(stop_engaged=False, drivers_active=True, battery_v=self._settings.battery_v)
             return [self._stamped("status", BaseReport(status), arrival_ns, t_ns)]
         truth = self._source.read_base(t_ns)
+        samples: list[Stamped[BaseFeed]] = []
         if kind == "odometry":
-            samples = [self._stamped("odometry", BaseOdometry(truth.twist), arrival_ns, t_ns)]
+            twist = self._odometry_noise.twist(truth.twist)
+            samples.append(self._stamped("odometry", BaseOdometry(twist), arrival_ns, t_ns))
             if self._pose_source == "odometry":
-                pose = seen_from(self._origin, truth.pose)
+                pose = seen_from(self._origin, truth.rolled)
                 samples.append(self._stamped("pose", BasePose(pose), arrival_ns, t_ns))
             return samples
-        slider = SliderPose(self._source.read_slider(t_ns))
-        samples = [self._stamped("slider", slider, arrival_ns, t_ns)] if self._settings.topics.slider_pose else []
         if self._pose_source != "odometry":
-            samples.insert(0, self._stamped("pose", BasePose(truth.pose), arrival_ns, t_ns))
+            samples.append(self._stamped("pose", BasePose(self._base_noise.pose(truth.pose)), arrival_ns, t_ns))
+        if self._settings.topics.slider_pose:
+            slider = SliderPose(self._slider_noise.pose(self._source.read_slider(t_ns)))
+            samples.append(self._stamped("slider", slider, arrival_ns, t_ns))
         return samples
 
     def _stamped(self, kind: str, value: BaseFeed, arrival_ns: int, t_ns: int) -> Stamped[BaseFeed]:

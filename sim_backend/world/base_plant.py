@@ -5,7 +5,8 @@ controller's own tick of 25 Hz (times one plus `rate_error`, shifted by `tick_ph
 the first grid time that is not before it. At a tick the newest command that arrived by then is clamped to the
 speed limits, or replaced by zero when it is older than 0.25 s, and approached within the acceleration limits, each
 axis on its own. Between ticks the wheels hold that velocity: the real ones reach it within a tick, which is
-negligible for the contact. The pose is integrated with the heading in the middle of each step.
+negligible for the contact. The pose is integrated with the heading in the middle of each step; of the wheels' way over
+the floor a share `slip` is lost, turning loses nothing.
 
 A tick takes effect when the plant leaves its grid time, so a command that arrives at exactly that time still counts,
 and the result does not depend on how the calls divide the time.
@@ -45,9 +46,12 @@ class BasePlant:
 
     `start`: pose in the WORLD frame. `start_ns`: origin of both clocks. `tick_phase`: first tick after this fraction
     of a period, in [0, 1). `rate_error`: relative error of the controller's clock (0.0001: 25.0025 Hz).
+    `slip`: share of the wheels' way that is lost, in [0, 1).
     """
 
-    def __init__(self, start: Pose2D, start_ns: int, *, tick_phase: float = 0.0, rate_error: float = 0.0) -> None:
+    def __init__(
+        self, start: Pose2D, start_ns: int, *, tick_phase: float = 0.0, rate_error: float = 0.0, slip: float = 0.0
+    ) -> None:
         period_ns = NS_PER_S / (TICK_RATE_HZ * (1.0 + rate_error))
         self._tick_period_ns = period_ns
         self._tick_phase = tick_phase
@@ -55,6 +59,8 @@ class BasePlant:
         self._tick = 0
         self._tick_due_ns = self._grid_time_of_tick(0)
         self._now_ns = start_ns
+        self._start = start
+        self._grip = 1.0 - slip
         self._x, self._y, self._yaw = start.x, start.y, start.yaw
         self._velocity = BodyTwist()
         self._drivers_active = True
@@ -77,6 +83,12 @@ class BasePlant:
     def place(self) -> tuple[float, float, float]:
         """The pose as plain numbers: x, y in m, yaw in rad (not wrapped)."""
         return self._x, self._y, self._yaw
+
+    @property
+    def rolled(self) -> Pose2D:
+        """The pose had the wheels not slipped, which is what they count."""
+        start, grip = self._start, self._grip
+        return Pose2D(start.x + (self._x - start.x) / grip, start.y + (self._y - start.y) / grip, wrap_angle(self._yaw))
 
     @property
     def velocity(self) -> BodyTwist:
@@ -148,8 +160,9 @@ class BasePlant:
             return
         turn = v.omega * _GRID_S
         cosine, sine = math.cos(self._yaw + 0.5 * turn), math.sin(self._yaw + 0.5 * turn)
-        self._x += (v.vx * cosine - v.vy * sine) * _GRID_S
-        self._y += (v.vx * sine + v.vy * cosine) * _GRID_S
+        way_s = _GRID_S * self._grip
+        self._x += (v.vx * cosine - v.vy * sine) * way_s
+        self._y += (v.vx * sine + v.vy * cosine) * way_s
         self._yaw += turn
 
 

@@ -21,10 +21,12 @@ class ArmTruth(msgspec.Struct, frozen=True, gc=False):
 
 
 class BaseTruth(msgspec.Struct, frozen=True, gc=False):
-    """Pose of the base in the WORLD frame and its measured velocity in the BODY frame."""
+    """Pose of the base in the WORLD frame and the velocity of its wheels in the BODY frame."""
 
     pose: Pose2D
     twist: BodyTwist
+    rolled: Pose2D
+    """Where the wheels would have brought the base had they not slipped: the pose that odometry counts."""
 
 
 class FtSource(Protocol):

@@ -41,8 +41,13 @@ class World:
         self, rig: RigConfig, seed: int, start_ns: int, on_record: Callable[[WorldRecord], None] = _ignore
     ) -> None:
         scene = place(rig, seed)
+        self.seed = seed
         self._plant = BasePlant(
-            scene.base, start_ns, tick_phase=rig.world.base_phase, rate_error=rig.world.base_tick_rate_error
+            scene.base,
+            start_ns,
+            tick_phase=rig.world.base_phase,
+            rate_error=rig.world.base_tick_rate_error,
+            slip=rig.world.slip,
         )
         self._slider = PushedSlider(
             slider_model(rig.world.slider),
@@ -95,7 +100,7 @@ class World:
     def read_base(self, t_ns: int) -> BaseTruth:
         """See `BaseSource.read_base`."""
         self.advance_to(t_ns)
-        return BaseTruth(self._plant.pose, self._plant.velocity)
+        return BaseTruth(self._plant.pose, self._plant.velocity, self._plant.rolled)
 
     def read_slider(self, t_ns: int) -> Pose2D:
         """See `BaseSource.read_slider`."""

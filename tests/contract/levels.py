@@ -76,7 +76,7 @@ class Simulated:
             return SimFt300(self._world, self._clock)
         if self.device == "ur10":
             return SimUr10(self._world, self._clock)
-        return SimRidgeback(self._world, self._clock, settings=ridgeback_settings(self._rig))
+        return SimRidgeback(self._world, self._clock, settings=ridgeback_settings(self._rig, 0))
 
     def let_pass(self, seconds: float) -> None:
         self._clock.advance_to(self._clock() + round(seconds * 1e9))

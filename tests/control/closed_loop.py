@@ -23,7 +23,10 @@ LINK_UP = 2
 
 
 class ClosedLoop:
-    """One push, tick by tick. `state`, `output` and `world` are those after the newest tick."""
+    """One push, tick by tick. `state`, `output` and `world` are those after the newest tick.
+
+    Pose and odometry are the world's own, without noise, and the wheels do not slip.
+    """
 
     def __init__(
         self,
@@ -36,7 +39,7 @@ class ClosedLoop:
         counts: bool = True,
         world: World | None = None,
     ) -> None:
-        self.rig = resolve_rig("sim", overrides)
+        self.rig = resolve_rig("sim", ("world.slip=0", *overrides))
         self.core = TickCore.of(self.rig)
         self.world = world or World(self.rig, seed, START_NS)
         self.state = TickState()

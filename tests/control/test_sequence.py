@@ -25,6 +25,12 @@ def carried_to(bench, **place):
     bench.state = replace(bench.state, safety=replace(bench.state.safety, **moved))
 
 
+def felt(bench, alter=None, packets=2):
+    """Fold two ticks: of the median of three readings, what is new is felt with the second packet."""
+    for n in range(packets):
+        bench.fold(alter, n)
+
+
 def velocity(bench):
     twist = bench.output.wanted_world
     return twist.vx, twist.vy
@@ -76,13 +82,13 @@ def test_nothing_moves_before_the_approach():
     assert bench.tick == 20 + 100  # 20 packets of each device, then a second of tare
 
 
-def test_a_saved_tare_starts_with_the_approach_and_its_own_joints():
+def test_a_saved_tare_is_kept_after_a_second_at_rest_and_so_are_its_own_joints():
     bench = FoldBench()
     bench.core = TickCore.of(bench.rig, in_contact=True)
     joints = tuple(q + 0.004 for q in bench.rig.arm.held_pose_rad)
     bench.state = TickState(ControlState(tared=True, bias_force=BIAS[:3], bias_torque=BIAS[3:], held_joints=joints))
     bench.run_to(Phase.APPROACH)
-    assert bench.tick == 20
+    assert bench.tick == 20 + 100
     assert bench.state.control.held_joints == joints
     bench.pose = Pose2D(-0.95, 0.0, 0.0)  # the ball at the object
     bench.run_to(Phase.PUSH)
@@ -103,8 +109,8 @@ def test_the_approach_ramps_up_along_the_path_until_five_samples_of_force():
     assert speeds[:3] == pytest.approx([0.0005, 0.001, 0.0015], abs=1e-12)
     assert max(speeds) == 0.05
     assert bench.state.control.contact_run == 5
-    # 5 samples at 0.05 m/s and 100 Hz: the push begins 4 ticks of 0.5 mm behind the first touch.
-    assert bench.state.control.contact_from_m == pytest.approx(GAP_M + 4 * 0.0005, abs=0.0006)
+    # 5 samples, a packet late, at 0.05 m/s and 100 Hz: the push begins 5 ticks of 0.5 mm behind the first touch.
+    assert bench.state.control.contact_from_m == pytest.approx(GAP_M + 5 * 0.0005, abs=0.0006)
     assert bench.state.control.progress_m == 0.0
 
 
@@ -179,6 +185,8 @@ def test_the_law_steers_in_the_world():
     bench = pushing(("control.force_filter_tau_s=0",))
     carried_to(bench, y=-0.1)
     bench.force_path = (15.0 * math.cos(0.2), 15.0 * math.sin(0.2))
+    felt(bench)
+    carried_to(bench, y=-0.1)
     bench.fold()
     assert bench.state.control.lateral_m == pytest.approx(-0.1, abs=1e-12)
     assert bench.state.control.theta_f == pytest.approx(0.2, abs=4e-3)  # the bench's scatter of 0.05 N
@@ -206,7 +214,7 @@ def test_the_open_loop_baseline_goes_straight_whatever_it_feels():
     bench = pushing(('control.controller="open-loop"', "control.force_filter_tau_s=0"))
     bench.force_path = (10.0, 10.0)
     bench.pose = replace(bench.pose, y=0.02)
-    bench.fold()
+    felt(bench)
     assert bench.state.control.theta_f == pytest.approx(math.pi / 4, abs=0.01)
     assert bench.state.control.theta_p == 0.0
     assert velocity(bench) == pytest.approx((0.1, 0.0), abs=1e-12)
@@ -216,9 +224,11 @@ def test_the_open_loop_baseline_goes_straight_whatever_it_feels():
 def test_a_push_angle_beyond_90_degrees_is_a_fault_and_never_clipped(side):
     """Force at 75 degrees, k_f 0.3: 97.5 degrees wanted. The direction stays as it was until the fault stops it."""
     bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
-    before = bench.state.control.theta_p
     angle = side * math.radians(75.0)
     bench.force_path = (15.0 * math.cos(angle), 15.0 * math.sin(angle))
+    bench.fold()
+    assert bench.state.control.backward_ticks == 0, "the median of three has it with the second packet"
+    before = bench.state.control.theta_p
     for n in range(19):
         bench.fold()
         assert bench.state.control.backward_ticks == n + 1
@@ -238,7 +248,7 @@ def test_a_moment_beyond_90_degrees_is_forgiven():
         for _ in range(19):
             bench.fold()
         bench.force_path = (15.0, 0.0)
-        bench.fold()
+        felt(bench)
         assert bench.state.control.backward_ticks == 0
     assert bench.output.faults == ()
 
@@ -249,7 +259,7 @@ def test_a_lost_force_begins_the_count_of_backward_ticks_anew():
         bench.force_path = (15.0 * math.cos(1.4), 15.0 * math.sin(1.4))
         for _ in range(19):
             bench.fold()
-        bench.fold(no_force)
+        felt(bench, no_force)
         assert bench.state.control.phase == Phase.LOST
         assert bench.state.control.backward_ticks == 0
     assert bench.output.faults == ("F52",)
@@ -275,19 +285,20 @@ def lost(lateral=0.0, overrides=("control.force_filter_tau_s=0",)):
         bench.pose = replace(bench.pose, y=lateral)
         bench.force_path = (15.0 * math.cos(0.1), 15.0 * math.sin(0.1))
         bench.fold()
-    bench.fold(no_force)
+    felt(bench, no_force)
     assert bench.state.control.phase == Phase.LOST
     return bench
 
 
 def test_without_force_the_law_is_not_evaluated_and_the_pusher_turns_back():
     """2 cm left, k_y 0.2: the way back is -0.004 rad; turning there at 0.2 rad/s is 0.002 rad a tick."""
-    bench = pushing(("control.force_filter_tau_s=0",))
+    bench = FoldBench(("control.force_filter_tau_s=0",))
     bench.pose = replace(bench.pose, y=0.02)
-    for _ in range(5):
+    bench.at_full_speed()
+    for n in range(6):
         bench.pose = replace(bench.pose, y=0.02)
         bench.force_path = (15.0 * math.cos(0.05), 15.0 * math.sin(0.05))
-        bench.fold()
+        bench.fold(no_force if n == 5 else None)  # felt with the next packet only
     theta_f, theta_p = bench.state.control.theta_f, bench.state.control.theta_p
     assert theta_p == pytest.approx(1.3 * 0.05 + 0.2 * 0.02, abs=0.005)
     for n in range(1, 46):
@@ -305,6 +316,7 @@ def test_the_open_loop_baseline_searches_straight_ahead(lateral):
     """It knows no k_y: 2 cm beside the path it goes on along the path, touching or not."""
     bench = pushing(("control.force_filter_tau_s=0", "control.controller=open-loop"))
     carried_to(bench, y=lateral)
+    bench.fold(no_force)
     for n in range(45):
         bench.fold(no_force, n)
         assert bench.state.control.phase == Phase.LOST
@@ -324,7 +336,7 @@ def test_a_push_that_lost_its_object_is_not_done_by_distance():
     bench.fold(no_force)
     assert bench.state.control.progress_m > 2.0
     assert bench.state.control.phase == Phase.LOST
-    bench.fold()
+    felt(bench)
     assert bench.state.control.phase == Phase.REST
 
 
@@ -378,10 +390,10 @@ def test_a_force_that_comes_back_in_the_search_goes_on_pushing():
     bench = lost()
     for n in range(50):
         bench.fold(no_force, n)
-    bench.fold()
+    felt(bench)
     assert bench.state.control.phase == Phase.PUSH
     assert bench.output.faults == ()
-    bench.fold(no_force)  # lost again: a new search with all its time
+    felt(bench, no_force)  # lost again: a new search with all its time
     ticks = bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
     assert ticks >= 299
 
@@ -439,7 +451,6 @@ def test_the_filter_takes_each_packet_with_its_own_time(split):
     """A step filtered over 50 ms (tau 0.05 s) has gone 1 - 1/e of its way, however many packets told of it."""
     bench = pushing()
     bench.force_path = (15.0, 0.0)
-    start = bench.state.control.force_world[0]
 
     def burst(inp, _):
         one = inp.ft.readings[0]
@@ -450,6 +461,9 @@ def test_the_filter_takes_each_packet_with_its_own_time(split):
         )
         return replace(inp, ft=replace(inp.ft, readings=readings))
 
+    # The first packet of the step is felt with the next one, which counts from there on.
+    bench.fold(burst)
+    start = bench.state.control.force_world[0]
     for n in range(5):
         bench.fold(burst, n)
     assert bench.state.control.force_world[0] == pytest.approx(25.0 + (start - 25.0) * math.exp(-1.0), abs=0.05)
@@ -462,7 +476,9 @@ def filtered(force_world, gap_ms, tau_s=0.1):
     now_ns = 10_000_000_000
     reading = replace(bench.good_input().ft.readings[0], received_ns=now_ns, force=(BIAS[0], BIAS[1], BIAS[2] - 10.0))
     last_ns = now_ns - gap_ms * 1_000_000
-    before = replace(bench.state.control, last_reading_ns=last_ns, force_world=force_world, bias_force=BIAS[:3])
+    same = replace(bench.state.control.contact, before_last=reading.force, last=reading.force)
+    state = replace(bench.state.control, last_reading_ns=last_ns, bias_force=BIAS[:3], contact=same)
+    before = replace(state, force_world=force_world)
     return sense(settings, before, (reading,), 0.0, now_ns)
 
 

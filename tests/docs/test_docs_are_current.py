@@ -19,6 +19,7 @@ from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import blame_the_host
 from tools.cli import COMMANDS
 from tools.dev.drivers_page import page
+from tools.dev.fault_table import page as faults_page
 from tools.dev.fault_table import table
 from tools.dev.rig_reference import reference
 from tools.rig import resolve_rig
@@ -41,6 +42,12 @@ def test_drivers_page_is_current():
 
 def test_fault_table_is_current():
     assert table() in (ROOT / "docs/safety.md").read_text(), "paste the output of python -m tools.dev.fault_table"
+
+
+def test_faults_page_is_current():
+    assert (ROOT / "docs/faults.md").read_text() == faults_page(), (
+        "python -m tools.dev.fault_table --page > docs/faults.md"
+    )
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from msgspec.structs import replace
 
 from robot_io.messages import BaseStatus, BodyTwist, Pose2D
-from robot_io.tick import Operator, Phase, TickInput
-from tests.safety.fold_bench import BIAS, PERIOD_NS, Alter, FoldBench, pushing, with_force, without_contact
+from robot_io.tick import ControlState, Operator, Phase, TickInput, TickState
+from tests.safety.fold_bench import BIAS, GAP_M, PERIOD_NS, Alter, FoldBench, pushing, with_force, without_contact
+from tools.run.tick_core import TickCore
 
 UNFILTERED = ("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0")
 BY_THE_GATE = {
@@ -94,9 +95,71 @@ def shifted_pose(x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Alter:
     return alter
 
 
-def pressed(newton: float) -> Alter:
-    """Press straight on the ball: minus along the sensor's Z."""
-    return lambda inp, _: with_force(inp, (BIAS[0], BIAS[1], BIAS[2] - newton))
+def pressed(newton: float, upward: float = 0.0) -> Alter:
+    """Press straight on the ball, minus along the sensor's Z, and upward, along its X; it scatters as before."""
+
+    def alter(inp: TickInput, _: int) -> TickInput:
+        scatter = (inp.tick * 7 % 11 - 5) * 0.01
+        return with_force(inp, (BIAS[0] + upward + scatter, BIAS[1] + scatter, BIAS[2] - newton + scatter))
+
+    return alter
+
+
+def frozen_axis(axis: int) -> Alter:
+    """Repeat one number of the sensor as it reads at rest; for the push's own axis that is no contact."""
+
+    def alter(inp: TickInput, _: int) -> TickInput:
+        one = inp.ft.readings[0]
+        values = tuple(BIAS[i] if i == axis else value for i, value in enumerate((*one.force, *one.torque)))
+        return reading(force=values[:3], torque=values[3:])(inp, 0)
+
+    return alter
+
+
+def damaged(every: int) -> Alter:
+    """Damage one packet in so many; the others come as before."""
+    return lambda inp, n: replace(inp, ft=replace(inp.ft, crc_fail=n // every + 1))
+
+
+def one_of(every: int) -> Alter:
+    """Let one packet in so many arrive."""
+
+    def alter(inp: TickInput, n: int) -> TickInput:
+        lost = n + 1 - (n + 1) // every
+        readings = inp.ft.readings if (n + 1) % every == 0 else ()
+        return replace(inp, ft=replace(inp.ft, readings=readings, packets_ok=inp.ft.packets_ok - lost))
+
+    return alter
+
+
+def creeping_pose(x: float = 0.0, y: float = 0.0) -> Alter:
+    """Shift the pose a little further each tick: m/s."""
+    return lambda inp, n: shifted_pose(x * 0.01 * (n + 1), y * 0.01 * (n + 1))(inp, n)
+
+
+def turned_way(degrees: float, from_x: float) -> Alter:
+    """Let the pose go aside of where the base goes, from the place where its x is `from_x`."""
+
+    def alter(inp: TickInput, n: int) -> TickInput:
+        way = inp.base.pose.x - from_x
+        turn = math.radians(degrees)
+        return shifted_pose(way * (math.cos(turn) - 1.0), way * math.sin(turn))(inp, n)
+
+    return alter
+
+
+def spike(newton: float) -> Alter:
+    """Press once, in the first tick only."""
+    return lambda inp, n: pressed(newton)(inp, n) if n == 0 else inp
+
+
+def stuck(newton: float) -> Alter:
+    """Press, and let the base stay where it is: the pose lags behind what the bench's base drives at 0.1 m/s."""
+
+    def alter(inp: TickInput, n: int) -> TickInput:
+        return shifted_pose(x=-0.001 * n)(pressed(newton)(inp, n), n)
+
+    return alter
 
 
 def then(*alters: Alter) -> Alter:
@@ -174,11 +237,63 @@ def approaching_at_full_speed() -> FoldBench:
     return bench
 
 
+def just_before_contact(overrides: tuple[str, ...] = (), alter: Alter | None = None) -> FoldBench:
+    """Return a bench at the approach's full speed, 1 cm before the object."""
+    bench = FoldBench(overrides).run_to(Phase.APPROACH)
+    bench.run_until(lambda b: b.pose.x + 1.0 >= GAP_M - 0.01, alter)
+    return bench
+
+
+def touching_backward() -> FoldBench:
+    """Return a bench in its first tick of contact, whose sensor says that the object pulls."""
+    bench = FoldBench().run_to(Phase.APPROACH)
+    bench.force_path = (-15.0, 0.0)
+    return bench.run_to(Phase.PUSH)
+
+
+def pushing_for_a_while() -> FoldBench:
+    """Return a bench that has pushed with 15 N for 4 s."""
+    bench = pushing()
+    for _ in range(300):
+        bench.fold()
+    return bench
+
+
+def in_contact_at_rest() -> FoldBench:
+    """Return a bench that has begun in contact, with a saved tare, and looks at the force before it moves."""
+    bench = FoldBench()
+    bench.core = TickCore.of(bench.rig, in_contact=True)
+    bench.pose = Pose2D(-0.95, 0.0, 0.0)
+    joints = bench.rig.arm.held_pose_rad
+    bench.state = TickState(ControlState(tared=True, bias_force=BIAS[:3], bias_torque=BIAS[3:], held_joints=joints))
+    return bench.run_to(Phase.TARE)
+
+
 def approaching_in_vain() -> FoldBench:
     """Return a bench whose next tick sees the ball more than 0.5 m beyond the expected contact."""
     bench = FoldBench().run_to(Phase.APPROACH)
     while bench.pose.x + 1.0 - bench.state.control.approach_from_m <= 0.55:
         bench.fold(without_contact)
+    return bench
+
+
+def far_on(phase: Phase, after_ticks: int = 0, **changes: float) -> Callable[[], FoldBench]:
+    """Return a way to a bench that has nearly used up what safety allows this phase."""
+
+    def start() -> FoldBench:
+        bench = pushing() if phase == Phase.PUSH else FoldBench().run_to(phase)
+        for _ in range(after_ticks):
+            bench.fold()
+        motion = replace(bench.state.safety.motion, **changes)
+        bench.state = replace(bench.state, safety=replace(bench.state.safety, motion=motion))
+        return bench
+
+    return start
+
+
+def resumed_three_times() -> FoldBench:
+    bench = lost_for_good()
+    bench.state = replace(bench.state, control=replace(bench.state.control, resumes=3))
     return bench
 
 
@@ -217,7 +332,7 @@ def alternate_torque(inp: TickInput, n: int) -> TickInput:
     return reading(torque=(21.0 + BIAS[3], BIAS[4] + 0.001 * n, BIAS[5]))(inp, n)
 
 
-CREEPS = base(odometry=BodyTwist(0.015, 0.0, 0.0))
+CREEPS = then(base(odometry=BodyTwist(0.015, 0.0, 0.0)), creeping_pose(x=0.015))
 """Above what counts as rest, below what counts as moving (F34) or as ignoring the command (F33)."""
 NAN = math.nan
 SERVO = ('arm.hold="servo"',)
@@ -230,6 +345,13 @@ SCENARIOS = [
         lambda: FoldBench(("ft.noise_force_N=0", "ft.noise_torque_Nm=0")).run_to(Phase.TARE), warm=99,
         also=frozenset({"R02"}),
     ),
+    *(
+        Scenario("R02-dead", f"axis {i}", frozen_axis(i), lambda: FoldBench().run_to(Phase.TARE), warm=99)
+        for i in range(6)
+    ),
+    Scenario("R02-dead", "in contact", frozen_axis(4), in_contact_at_rest, warm=99),
+    Scenario("R02-contact", "it pulls", pressed(-4.0), in_contact_at_rest, warm=99),
+    Scenario("R02-contact", "it lifts", pressed(9.0, upward=5.0), in_contact_at_rest, warm=99),
     Scenario("R05", "odometry creeps", CREEPS, lambda: FoldBench().run_to(Phase.TARE), warm=500),
     Scenario("R04", "arm elsewhere", moved_joint(0.051), FoldBench, warm=19),
     # --- force-torque sensor
@@ -237,7 +359,12 @@ SCENARIOS = [
     Scenario("F01-hold", "silent", ft(readings=())),
     Scenario("F01-stop", "silent", ft(readings=()), also=frozenset({"F52"})),
     Scenario("F02", "unplugged", ft(link=3)),
+    Scenario("F04", "half of the packets", damaged(2)),
+    Scenario("F04", "one in four", damaged(4)),
     Scenario("F06", "frozen", reading(force=(BIAS[0], BIAS[1], BIAS[2] - 15.0), torque=BIAS[3:])),
+    *(
+        Scenario("F06", f"axis {i}", frozen_axis(i), also=frozenset({"F52"} if i == 2 else ())) for i in range(6)
+    ),
     *(
         Scenario("F07", f"force axis {i}, {sign:+.0f}", reading(force=tuple(sign * 285.0 * (i == k) for k in range(3))),
                  taring)
@@ -249,13 +376,19 @@ SCENARIOS = [
         for i in range(3) for sign in (1.0, -1.0)
     ),
     Scenario("F07", "while pushing", pressed(340.0), also=frozenset({"F50-stop"})),
-    Scenario("F09", "drifted", lambda inp, _: with_force(inp, (BIAS[0] + 6.0, BIAS[1], BIAS[2])),
-             lambda: pushed(Phase.RETREAT),
-             also=frozenset({"F06"})),
+    Scenario("F08", "one wild packet", spike(96.0)),
+    Scenario("F09", "drifted", pressed(0.0, upward=6.0), lambda: pushed(Phase.RETREAT)),
+    Scenario("F09-before", "drifted", lambda inp, n: pressed(15.0 if n > 20 else 0.0, upward=4.0)(inp, n),
+             lambda: just_before_contact(alter=pressed(0.0, upward=4.0))),
     Scenario("F10", "NaN", reading(force=(NAN, 0.0, 0.0)), also=frozenset({"F52"})),
     Scenario("F10", "infinite", reading(force=(0.0, -math.inf, 0.0)), also=frozenset({"F52"})),
     Scenario("F10", "torque NaN", reading(torque=(0.0, 0.0, NAN))),
     Scenario("F10", "NaN while taring", reading(force=(0.0, 0.0, NAN)), taring),
+    Scenario("F11", "lifts", pressed(15.0, upward=9.0), lambda: FoldBench().run_to(Phase.PUSH)),
+    Scenario("F11", "presses down", pressed(15.0, upward=-9.0), lambda: FoldBench().run_to(Phase.PUSH)),
+    Scenario("F11", "pulls", lambda inp, _: inp, touching_backward),
+    Scenario("F12-low", "half of the packets", one_of(2)),
+    Scenario("F12-hold", "a third of the packets", one_of(3)),
     # --- arm
     *(Scenario("F20-hold", f"joint {i}", moved_joint(0.006 * (-1) ** i, i)) for i in range(6)),
     Scenario("F20-stop", "drift", moved_joint(-0.0101)),
@@ -285,9 +418,22 @@ SCENARIOS = [
     ),
     Scenario("F32-slow", "lags", base(lag_ns=60_000_001)),
     Scenario("F32-stop", "lags", base(lag_ns=120_000_001)),
-    Scenario("F33", "stands", base(odometry=BodyTwist())),
-    Scenario("F33", "goes elsewhere", base(odometry=BodyTwist(0.1, 0.06, 0.0))),
-    Scenario("F33", "stands while approaching", base(odometry=BodyTwist()), approaching_at_full_speed),
+    Scenario("F33", "stands", then(base(odometry=BodyTwist()), creeping_pose(x=-0.1))),
+    Scenario("F33", "goes elsewhere", then(base(odometry=BodyTwist(0.1, 0.06, 0.0)), creeping_pose(y=0.06))),
+    Scenario("F33", "stands while approaching", then(base(odometry=BodyTwist()), creeping_pose(x=-0.05)),
+             approaching_at_full_speed),
+    Scenario("F33-way", "a third too slow", then(base(odometry=BodyTwist(0.067, 0.0, 0.0)), creeping_pose(x=-0.033))),
+    Scenario("F33-way", "a quarter too slow", then(base(odometry=BodyTwist(0.075, 0.0, 0.0)), creeping_pose(x=-0.025))),
+    Scenario("F33-way", "a third too fast", then(base(odometry=BodyTwist(0.133, 0.0, 0.0)), creeping_pose(x=0.033))),
+    Scenario("F33-way", "aside", then(base(odometry=BodyTwist(0.0966, 0.0259, 0.0)), creeping_pose(-0.0034, 0.0259))),
+    Scenario("F37", "mirrored", creeping_pose(x=-0.2)),
+    Scenario("F37", "a quarter too short", creeping_pose(x=-0.025)),
+    Scenario("F37", "a third too long", creeping_pose(x=0.033)),
+    Scenario("F37", "turned left", creeping_pose(-0.0034, 0.0259)),
+    Scenario("F37", "turned right", creeping_pose(-0.0034, -0.0259)),
+    Scenario("F37", "drifts", creeping_pose(y=0.05)),
+    Scenario("F37", "drifts while approaching", creeping_pose(y=-0.05), approaching_at_full_speed),
+    Scenario("F37", "turns", lambda inp, n: shifted_pose(yaw=0.001 * n)(inp, n)),
     Scenario(
         "F34", "rolls on", then(operator(Operator.STOP), base(odometry=BodyTwist(0.1, 0.0, 0.0))),
         also=frozenset({"F64"}),
@@ -299,7 +445,8 @@ SCENARIOS = [
     Scenario("F38", "stop pressed", base(status=BaseStatus(True, True, 26.0))),
     Scenario("F38", "motors off", base(status=BaseStatus(False, False, 26.0))),
     Scenario("F39", "creeps after the push", CREEPS, lambda: pushed(Phase.REST), warm=500),
-    Scenario("F39", "creeps while the zero is checked", CREEPS, lambda: pushed(Phase.CHECK), warm=500),
+    Scenario("F39", "creeps while the zero is checked", CREEPS, lambda: pushed(Phase.CHECK), warm=500,
+             also=frozenset({"F45-retreat"})),
     Scenario("F39", "creeps after the force was lost", then(CREEPS, without_contact), lost_for_good, warm=500,
              also=frozenset({"F52-hold"})),
     Scenario("F40-slow", "silent", old("base", "pose_received_ns")),
@@ -312,6 +459,8 @@ SCENARIOS = [
         Scenario("F42", f"NaN {key}", base(pose=replace(Pose2D(), **{key: NAN})))
         for key in ("x", "y", "yaw")
     ),
+    Scenario("F43", "stands", creeping_pose(x=-0.1)),
+    Scenario("F43", "stands while approaching", creeping_pose(x=-0.05), approaching_at_full_speed),
     Scenario("F44", "turned left", shifted_pose(yaw=0.088)),
     Scenario("F44", "turned right", shifted_pose(yaw=-0.088)),
     Scenario("F67", "latched", base(latched=True, latch_cause=1)),
@@ -319,6 +468,22 @@ SCENARIOS = [
     Scenario("F67-late", "frozen", old("base", "published_ns")),
     Scenario("F47", "further than it can need", base(latched=True, latch_cause=14, travel_m=9.0)),
     Scenario("F48", "longer than it can need", base(latched=True, latch_cause=15, moving_s=900.0)),
+    # What the shipped rig can need: 0.655 m and 28.2 s, 3.13 m and 74.6 s, 0.105 m and 6.2 s (docs/safety.md).
+    Scenario("F45-approach", "search", without_contact, far_on(Phase.APPROACH, 80, sent_m=0.6549)),
+    Scenario("F45-approach", "search, measured", without_contact, far_on(Phase.APPROACH, 80, measured_m=0.6549)),
+    Scenario("F45-push", "push", creeping_pose(), far_on(Phase.PUSH, sent_m=3.1299)),
+    Scenario("F45-retreat", "retreat", creeping_pose(), far_on(Phase.RETREAT, 40, measured_m=0.1049)),
+    Scenario("F46-approach", "search", without_contact, far_on(Phase.APPROACH, 80, moving_ns=28_195_000_000)),
+    Scenario("F46-push", "push", creeping_pose(), far_on(Phase.PUSH, moving_ns=74_595_000_000)),
+    Scenario("F46-retreat", "retreat", creeping_pose(), far_on(Phase.RETREAT, 40, moving_ns=6_195_000_000)),
+    Scenario("F59", "aside in the approach", turned_way(20.0, -1.0), lambda: FoldBench().run_to(Phase.APPROACH),
+             warm=85, also=frozenset({"F37"})),
+    Scenario("F59", "aside in the push", turned_way(-20.0, -0.95), lambda: FoldBench().run_to(Phase.PUSH),
+             warm=20, also=frozenset({"F37"})),
+    Scenario("F52-refused", "a fourth time", then(operator(Operator.RESUME), without_contact), resumed_three_times,
+             also=frozenset({"F52-hold"})),
+    Scenario("R07", "in millimetres", shifted_pose(x=-1500.0), FoldBench, warm=19),
+    Scenario("R07", "far aside", shifted_pose(y=1000.1), FoldBench, warm=19),
     # --- force and task
     Scenario("F50-slow", "pressed", pressed(101.0)),
     Scenario("F50-stop", "pressed", pressed(151.0)),
@@ -337,6 +502,11 @@ SCENARIOS = [
     Scenario("F55-stop", "drifts beside the box from the start", base(odometry=BodyTwist(0.1, 0.05, 0.0)),
              beside_the_start_box),
     Scenario("F55-stop", "object", object_at(2.64), lambda: pushing(WIDE)),
+    Scenario("F53-early", "much too soon", lambda inp, _: inp,
+             lambda: just_before_contact(("path.expected_contact_m=0.7",))),
+    Scenario("F54-stop", "against a wall", stuck(60.0)),
+    Scenario("F54-hold", "110 N", pressed(110.0), warm=1002, also=frozenset({"F50-slow"})),
+    Scenario("F54-hold", "four times the usual", pressed(62.0), pushing_for_a_while, warm=1006),
     Scenario("F56", "backward", lambda inp, _: inp, pushing_sideways),
     Scenario("F58", "no number", lambda inp, _: inp, pushing_by_no_law),
     # --- host

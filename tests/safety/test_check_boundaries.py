@@ -103,25 +103,6 @@ def test_age_of_the_sensor(age_ms, row):
     assert sensor_checks.check(SETTINGS, older, silent, TARED)[1] == [following]
 
 
-@pytest.mark.parametrize(
-    ("run", "speed", "noise_floor", "found"),
-    [(29, 0.1, True, True), (28, 0.1, True, False), (99, 0.0, True, False), (99, 0.1, False, False)],
-)
-def test_frozen_only_while_moving_and_only_where_there_is_noise(run, speed, noise_floor, found):
-    one = GOOD.ft.readings[0]
-    state = SafetyState(last_ft_ns=NOW, last_ft_force=one.force, last_ft_torque=one.torque, frozen_run=run)
-    settings = replace(SETTINGS, noise_floor=noise_floor)
-    quiet = replace(TARED, tared=False, speed=speed)
-    assert sensor_checks.check(settings, state, GOOD, quiet)[1] == (["F06"] if found else [])
-
-
-def test_one_changed_number_is_not_frozen():
-    one = GOOD.ft.readings[0]
-    state = SafetyState(last_ft_force=one.force, last_ft_torque=(0.0, *one.torque[1:]), frozen_run=99)
-    after, found = sensor_checks.check(SETTINGS, state, GOOD, replace(TARED, tared=False))
-    assert (after.frozen_run, found) == (0, [])
-
-
 # --- arm ---------------------------------------------------------------------------------------------------------
 
 

@@ -10,12 +10,16 @@ import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
 from safety import (
+    agreement_checks,
     arm_checks,
     base_checks,
     clock_checks,
+    force_checks,
     host_checks,
     link_checks,
+    motion_checks,
     sensor_checks,
+    stuck_checks,
     supervisor,
     task_checks,
     workspace_checks,
@@ -74,15 +78,23 @@ def test_the_row_is_noticed_in_time_and_reacted_to(scenario):
 
 
 EVIDENCE = {
-    "F01-slow": 5, "F01-hold": 8, "F01-stop": 16, "F06": 29, "F21": 1, "F24-hold": 4, "F25-hold": 4, "F25-stop": 10,
-    "F31-hold": 10, "F31-stop": 25, "F33": 30, "F34": 34, "F35": 2, "F40-slow": 5, "F40-stop": 12, "F41": 2,
-    "F56": 19, "F63": 100, "F63 records lost": 0, "F73-hold": 50, "F73-stop": 200,
+    "F01-slow": 5, "F01-hold": 8, "F01-stop": 16, "F06": 30, "F21": 1, "F24-hold": 4, "F25-hold": 4, "F25-stop": 10,
+    "F31-hold": 10, "F31-stop": 25, "F33": 30, "F34": 34, "F35": 3, "F40-slow": 5, "F40-stop": 12, "F41": 2,
+    "F56": 20, "F63": 100, "F63 records lost": 0, "F73-hold": 50, "F73-stop": 200,
     "F67-late": 10, "F24-stop no record": 10, "F60-slow three in a row": 2, "R01": 1,
+    "F04 half of the packets": 8, "F04 one in four": 16, "F08": 1, "F11": 19, "F11 pulls": 18, "F12-low": 86,
+    "F12-hold": 86, "F52": 1, "F52-hold": 1, "F54-stop": 48,
 }  # fmt: skip
 """Ticks of bad input without which a row must not be raised; all others speak in the first tick."""
+WITHOUT_EVIDENCE = ("F09", "F09-before", "F36", "F53-early")
+"""Rows whose scenario begins before there can be anything to see."""
 
 
-@pytest.mark.parametrize("scenario", [s for s in SCENARIOS if s.row not in ("F09", "F36")], ids=str)
+BY_WAY = ("F33-way", "F37", "F43", "F59")
+"""Rows that go by the way, not by the time: see the tests of these checks."""
+
+
+@pytest.mark.parametrize("scenario", [s for s in SCENARIOS if s.row not in (*WITHOUT_EVIDENCE, *BY_WAY)], ids=str)
 def test_the_row_is_not_raised_before_there_is_evidence(scenario):
     expected = EVIDENCE.get(str(scenario), EVIDENCE.get(scenario.row, 0))
     assert ticks_to(scenario, 300)[1] == expected
@@ -151,7 +163,9 @@ def test_the_table_says_what_it_means():
 # --- the test of the tests: without its check, a row goes unnoticed -----------------------------------------------
 
 CHECKS = {
+    "safety.force_checks": force_checks,
     "safety.sensor_checks": sensor_checks,
+    "safety.stuck_checks": stuck_checks,
     "safety.arm_checks": arm_checks,
     "safety.base_checks": base_checks,
     "safety.host_checks": host_checks,
@@ -160,6 +174,8 @@ CHECKS = {
     "safety.task_checks": task_checks,
     "safety.supervisor": supervisor,
     "safety.workspace_checks": workspace_checks,
+    "safety.motion_checks": motion_checks,
+    "safety.agreement_checks": agreement_checks,
 }
 
 
@@ -169,7 +185,7 @@ def naming(tree: ast.Module, row: str) -> list[ast.If]:
     def names(node: ast.AST) -> bool:
         if isinstance(node, ast.Constant) and node.value == row:
             return True
-        if isinstance(node, ast.Name) and node.id == "_REFUSALS" and row in ("R02", "R03"):
+        if isinstance(node, ast.Name) and node.id == "_REFUSALS" and row in ("R02", "R03", "R02-dead", "R02-contact"):
             return True
         return any(names(child) for child in ast.iter_child_nodes(node) if not isinstance(child, ast.If))
 

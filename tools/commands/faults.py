@@ -70,6 +70,8 @@ def described(fault: Fault) -> dict[str, Any]:
         "clears": "by itself" if fault.clears == Clears.AUTO else "with a new run",
         "bound_ticks": fault.bound_ticks,
         "exit_code": fault.exit_code if fault.mode >= Mode.HOLD else None,
+        "cause": fault.cause,
+        "next_step": fault.next_step,
     }
 
 

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from robot_io.rig.config import RigConfig
 from robot_io.tick import Operator, TickInput, TickState
+from safety.gate_shell import GateShell
 from tools.faults.lockstep_round import PERIOD_NS, raise_defect
 from tools.faults.scenario import Alter
 from tools.rig import resolve_rig
@@ -29,6 +30,11 @@ def host(**changes: bool | int) -> Alter:
 def host_once(ticks: int, **changes: bool | int) -> Alter:
     """Return the alteration of facts of the host for the first so many ticks."""
     return lambda inp, state, n: host(**changes)(inp, state, n) if n < ticks else inp
+
+
+def silent(key: str) -> Alter:
+    """Return the alteration in which a process gives no sign of life, by the name of the fact."""
+    return lambda inp, state, n: host(**{key: n * PERIOD_NS})(inp, state, n)
 
 
 def operator_stop(after_ticks: int = 0) -> Alter:
@@ -71,6 +77,16 @@ def _felt(inp: TickInput, state: TickState, force: tuple[float, float, float]) -
         for reading in inp.ft.readings
     )
     return replace(inp, ft=replace(inp.ft, readings=readings))
+
+
+def no_way_left(gate: GateShell) -> GateShell:
+    """Return a gate for which the base has travelled as far as it may."""
+    return replace(gate, bounds=replace(gate.bounds, distance_m=gate.travel.distance_m))
+
+
+def no_time_left(gate: GateShell) -> GateShell:
+    """Return a gate for which the base has moved for as long as it may."""
+    return replace(gate, bounds=replace(gate.bounds, moving_s=gate.travel.moving_ns * 1e-9))
 
 
 def without_law(core: TickCore) -> TickCore:

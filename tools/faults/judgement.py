@@ -32,7 +32,7 @@ def judged(scenario: Scenario, found: LockstepRound) -> Proof:
     row = FAULTS[scenario.row]
     ticks = found.ticks
     named = next((i for i, seen in enumerate(ticks) if row.id in seen.faults), None)
-    if _by_the_gate(scenario):
+    if scenario.silent or scenario.dead:
         named = found.first_bad
     bad = _first_bad(scenario, found)
 
@@ -51,15 +51,13 @@ def judged(scenario: Scenario, found: LockstepRound) -> Proof:
         return result(None, f"exit code {found.exit_code} instead of {row.exit_code}")
     if scenario.standing:
         return result(None, "the base moved" if any(seen.speed for seen in ticks[named:]) else "")
-    obeyed = _obeyed(row, ticks, named, ticks[bad - 1].speed if bad else 0.0, by_gate=_by_the_gate(scenario))
+    obeyed = _obeyed(
+        row, ticks, bad if scenario.by_gate else named, ticks[bad - 1].speed if bad else 0.0, by_gate=scenario.by_gate
+    )
     if obeyed is None:
         return result(None, "no command was reduced")
     measured = obeyed - bad
     return result(measured, "" if measured <= row.bound_ticks else "too late")
-
-
-def _by_the_gate(scenario: Scenario) -> bool:
-    return scenario.silent or scenario.dead
 
 
 def _first_bad(scenario: Scenario, found: LockstepRound) -> int | None:
@@ -69,9 +67,9 @@ def _first_bad(scenario: Scenario, found: LockstepRound) -> int | None:
     return None if begun is None else begun + scenario.evidence_ticks
 
 
-def _obeyed(row: Fault, ticks: Sequence[Seen], named: int, before: float, *, by_gate: bool) -> int | None:
-    """Return the first tick, from the one that names the row, whose command is reduced (zero for a STOP)."""
-    for i in range(named, len(ticks)):
+def _obeyed(row: Fault, ticks: Sequence[Seen], since: int, before: float, *, by_gate: bool) -> int | None:
+    """Return the first tick, from `since` on, whose command is reduced (zero for a STOP)."""
+    for i in range(since, len(ticks)):
         seen = ticks[i]
         most = 0.0 if row.mode >= Mode.STOP else before - LEAST_REDUCTION_M_PER_S
         if (by_gate or seen.mode >= row.mode) and (seen.speed <= most or seen.speed == 0.0):

@@ -29,6 +29,8 @@ class Seen(NamedTuple):
     """Of the command that left: control's envelope, or the gate where control is silent."""
     mode: int
     faults: tuple[str, ...]
+    base_y: float
+    """Of the base's newest pose, m, WORLD frame."""
     begun: bool
     """Whether the evidence that a row waits for is there."""
 
@@ -82,12 +84,16 @@ class FaultyLockstep(Lockstep):
 
     def _finish_tick(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
         super()._finish_tick(inp, after, output)
-        by_gate = self._scenario.silent or self._scenario.dead
-        command = self._gate.record.sent if by_gate and inp.tick >= self._from else output.command_body
+        command = self._gate.record.sent if self._scenario.by_gate and inp.tick >= self._from else output.command_body
         begun = self._scenario.begins is None or self._scenario.begins(inp, after)
-        self.ticks.append(Seen(after.control.phase, size(command), output.mode, output.faults, begun))
+        self.ticks.append(Seen(after.control.phase, size(command), output.mode, output.faults, inp.base.pose.y, begun))
         if len(self.ticks) > MOST_TICKS:
             raise _TooLong
+
+    def _take_base(self, now_ns: int) -> None:
+        super()._take_base(now_ns)
+        if self._scenario.gate is not None and now_ns == START_NS + self._from * PERIOD_NS:
+            self._gate = self._scenario.gate(self._gate)
 
     def _send(self, tick: int, now_ns: int, output: TickOutput) -> None:
         if tick < self._from or not (self._scenario.silent or self._scenario.dead):
@@ -102,6 +108,10 @@ def run_lockstep(scenario: Scenario, seed: int = 0) -> LockstepRound:
     """Run a scenario to its end."""
     settings = SETTINGS + scenario.settings
     from_tick = moment_tick(scenario.moment, settings, seed)
+    if scenario.edge_beside_m is not None:
+        left = reference(settings, seed)[from_tick].base_y + _rig(settings).base.outline_m[1] / 2
+        y_max = left + scenario.edge_beside_m
+        settings += ("workspace.x_m=[-50.0, 50.0]", f"workspace.y_m=[-50.0, {y_max!r}]")
     rig = with_faults(_rig(settings), at(scenario.words, from_tick * PERIOD_NS * 1e-9))
     one = FaultyLockstep(rig, seed, scenario, from_tick)
     code = -1
@@ -139,8 +149,10 @@ def reference(settings: tuple[str, ...], seed: int) -> tuple[Seen, ...]:
     """Return the ticks of a run without a fault."""
     ticks: list[Seen] = []
 
-    def on_tick(_inp: TickInput, state: TickState, output: TickOutput) -> None:
-        ticks.append(Seen(state.control.phase, size(output.command_body), output.mode, output.faults, True))
+    def on_tick(inp: TickInput, state: TickState, output: TickOutput) -> None:
+        ticks.append(
+            Seen(state.control.phase, size(output.command_body), output.mode, output.faults, inp.base.pose.y, True)
+        )
 
     Lockstep(_rig(settings), seed, _NoLog()).run(on_tick)
     return tuple(ticks)

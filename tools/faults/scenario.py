@@ -8,6 +8,7 @@ from enum import StrEnum
 import msgspec
 
 from robot_io.tick import TickInput, TickState
+from safety.gate_shell import GateShell
 from tools.run.tick_core import TickCore
 
 Alter = Callable[[TickInput, TickState, int], TickInput]
@@ -43,14 +44,23 @@ class Scenario(msgspec.Struct, frozen=True):
     """Control sends no frame to the gate from the moment on."""
     dead: bool = False
     """Control is gone from the moment on."""
+    gate: Callable[[GateShell], GateShell] | None = None
+    """Changes the gate at the moment."""
     settings: tuple[str, ...] = ()
     """Of the rig."""
+    edge_beside_m: float | None = None
+    """The workspace ends this far to the left of the base's outline at the moment."""
     begins: Callable[[TickInput, TickState], bool] | None = None
     """Where the row waits for evidence by design (a distance): whether there is enough of it."""
     evidence_ticks: int = 0
     """Where the row waits for evidence by design (a time): how long."""
     standing: bool = False
     """The base stands then, so that no command is to be reduced."""
+
+    @property
+    def by_gate(self) -> bool:
+        """Return whether the gate acts, not control: what it sends is measured."""
+        return self.silent or self.dead or self.gate is not None
 
 
 def at(words: tuple[str, ...], moment_s: float) -> tuple[str, ...]:

@@ -60,7 +60,7 @@ def open_ridgeback(
     loop: EventLoop, world: World, rig: RigConfig, host: str = "127.0.0.1", port: int = 0
 ) -> RosbridgeEmulator:
     """Open a rosbridge server with a Ridgeback behind it; port 0 picks a free port."""
-    return RosbridgeEmulator(loop, world, host=host, port=port, settings=ridgeback_settings(rig))
+    return RosbridgeEmulator(loop, world, host=host, port=port, settings=ridgeback_settings(rig, world.seed))
 
 
 OPENERS: dict[str, Callable[[EventLoop, World, RigConfig], Emulator]] = {

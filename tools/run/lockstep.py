@@ -81,7 +81,7 @@ class Lockstep:
         self._ft = simulated_sensor(rig, self.world, self._clock)
         self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_rate_hz, phase=world.arm_phase)
         self._base = SimRidgeback(
-            self.world, self._clock, settings=ridgeback_settings(rig), pose_source=rig.base.pose_source
+            self.world, self._clock, settings=ridgeback_settings(rig, seed), pose_source=rig.base.pose_source
         )
         self._note_injected = event_writer(push, SIM_EPOCH_NS - START_NS)
         self.first_injected_ns: int | None = None

@@ -21,6 +21,7 @@ DIMENSIONLESS = {
     "contact_friction": "a coefficient",
     "spread": "a ratio",
     "base_tick_rate_error": "a ratio",
+    "slip": "a share",
     "phase": "a part of a period",
     "arm_phase": "a part of a period",
     "base_phase": "a part of a period",

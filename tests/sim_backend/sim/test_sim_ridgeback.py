@@ -2,6 +2,7 @@ import itertools
 import math
 
 import pytest
+from msgspec.structs import replace
 
 from robot_io.clock import NS_PER_MS as MS
 from robot_io.clock import VirtualClock
@@ -10,6 +11,7 @@ from robot_io.rig.topics import TopicsConfig
 from sim_backend.ridgeback.settings import RidgebackSettings
 from sim_backend.ridgeback.standalone import StandaloneBase
 from sim_backend.sim.ridgeback import SimRidgeback
+from sim_backend.world.base_plant import BasePlant
 
 SETTINGS = RidgebackSettings(topics=TopicsConfig(slider_pose="/vicon/ThingBox/ThingBox"))
 
@@ -76,3 +78,30 @@ def test_refuses_what_is_not_finite_and_stays_quiet_when_closed():
         assert base.health().state == LinkState.UP
     assert base.drain() == ()
     assert base.health().state == LinkState.CLOSED
+
+
+def test_odometry_counts_the_wheels_and_motion_capture_sees_the_floor():
+    class Slipping(StandaloneBase):
+        def __init__(self, settings, start_ns, start):
+            super().__init__(settings, start_ns, start)
+            self.plant = BasePlant(start, start_ns, slip=0.1)
+
+    ways = {}
+    for pose_source in ("mocap", "odometry"):
+        clock = VirtualClock(1_000 * MS)
+        source = Slipping(SETTINGS, clock(), Pose2D(0.0, 0.0, 0.0))
+        with SimRidgeback(source, clock, settings=SETTINGS, pose_source=pose_source) as base:
+            for tick in range(1, 201):
+                clock.advance_to((1_000 + 10 * tick) * MS)
+                samples = base.drain()
+                base.command(BodyTwist(0.1, 0.0, 0.0))
+                ways[pose_source] = next((s.value.pose.x for s in of(samples, BasePose)), ways.get(pose_source))
+    assert ways["mocap"] == pytest.approx(0.9 * ways["odometry"], abs=0.0015)  # motion capture is 4 ms late
+
+
+def test_noise_is_on_every_feed_and_the_same_for_the_same_seed():
+    noisy = replace(SETTINGS, mocap_noise_m=0.0005, mocap_noise_rad=0.0035, odometry_noise_m_per_s=0.01)
+    assert run(noisy) == run(noisy) == run(noisy, every=3)
+    assert of(run(noisy), BasePose) != of(run(replace(noisy, seed=1)), BasePose)
+    assert len({sample.value.pose.y for sample in of(run(noisy), SliderPose)}) == 100
+    assert len({sample.value.twist.vy for sample in of(run(noisy), BaseOdometry)}) > 40

@@ -193,3 +193,17 @@ def test_arrivals_going_back_are_refused():
     base.command(BodyTwist(), START_NS + 9 * MS)
     with pytest.raises(ValueError, match="before"):
         base.command(BodyTwist(), START_NS + 8 * MS)
+
+
+def test_slip_loses_a_share_of_the_way_and_nothing_of_the_turn():
+    start = Pose2D(2.0, -1.0, 0.5)
+    slips, grips = BasePlant(start, START_NS, slip=0.1), BasePlant(start, START_NS)
+    for base in (slips, grips):
+        keep_commanding(base, BodyTwist(0.1, -0.05, 0.05), 2_000)
+    assert slips.velocity == grips.velocity  # what the wheels do
+    assert slips.pose.yaw == grips.pose.yaw
+    assert slips.pose.x - 2.0 == pytest.approx(0.9 * (grips.pose.x - 2.0), abs=1e-12)
+    assert slips.pose.y + 1.0 == pytest.approx(0.9 * (grips.pose.y + 1.0), abs=1e-12)
+    rolled, without = slips.rolled, grips.pose
+    assert (rolled.x, rolled.y, rolled.yaw) == pytest.approx((without.x, without.y, without.yaw), abs=1e-12)
+    assert grips.rolled == grips.pose

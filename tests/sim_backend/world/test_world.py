@@ -115,7 +115,7 @@ def test_a_late_world_catches_up_and_says_so():
 
 def test_a_command_acts_at_the_first_tick_of_the_base_not_before_its_arrival():
     """Base ticks of 40 ms (25 Hz, no rate error, phase 0.5: 20, 60, 100 ms ...) on the grid of 1 ms."""
-    rig = replace(RIG, world=replace(RIG.world, base_phase=0.5, base_tick_rate_error=0.0))
+    rig = replace(RIG, world=replace(RIG.world, base_phase=0.5, base_tick_rate_error=0.0, slip=0.0))
     for arrival_ms, moves_after_ms in ((0.0, 20), (19.9, 20), (20.0, 20), (20.1, 60), (59.0, 60), (60.5, 100)):
         world = World(rig, 0, START)
         world.advance_to(START + int(arrival_ms) * MS)

@@ -1,0 +1,120 @@
+"""`push faults`: the table, the proof of each row, and that the proof itself can fail."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from robot_io.tick import Mode
+from safety.faults import FAULTS
+from tests.replay.runs import push
+from tools.faults.judgement import judged
+from tools.faults.lockstep_round import LockstepRound, Seen
+from tools.faults.scenario import Scenario
+from tools.faults.scenarios import SCENARIOS
+
+
+def test_the_table_says_everything_of_a_row(tmp_path):
+    done = push("faults", "--json", state=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = {row["id"]: row for row in json.loads(done.stdout)["rows"]}
+    assert set(rows) == set(FAULTS)
+    row = rows["F50-stop"]
+    assert (row["limit"], row["unit"], row["reaction"], row["bound_ticks"], row["exit_code"]) == (
+        150,
+        "N",
+        "STOP",
+        1,
+        5,
+    )
+    for row in rows.values():
+        assert row["cause"].endswith(".")
+        assert row["next_step"].endswith(".")
+    plain = push("faults", state=tmp_path).stdout
+    assert all(i in plain for i in FAULTS)
+
+
+def test_only_takes_a_row_or_its_family(tmp_path):
+    for only, ids in (("F01", ["F01-slow", "F01-hold", "F01-stop"]), ("F01-hold", ["F01-hold"]), ("F02", ["F02"])):
+        done = push("faults", "--only", only, "--json", state=tmp_path)
+        assert [row["id"] for row in json.loads(done.stdout)["rows"]] == ids
+    done = push("faults", "--only", "F0", "--json", state=tmp_path)
+    assert done.returncode == 2
+    assert "no row `F0`" in json.loads(done.stdout)["error"]["what"]
+
+
+def test_a_family_is_proved_in_lockstep(tmp_path):
+    done = push("faults", "--run", "--only", "F40", "--json", state=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = [row for row in json.loads(done.stdout.splitlines()[-1])["rows"] if row["level"] == "sim"]
+    assert [row["id"] for row in rows] == ["F40-slow", "F40-stop"]
+    for row, bound in zip(rows, (5, 12), strict=True):
+        assert row["pass"]
+        assert 0 < row["measured_ticks"] <= row["bound_ticks"] == bound
+
+
+def test_every_row_has_a_scenario():
+    assert {scenario.row for scenario in SCENARIOS} == set(FAULTS)
+
+
+# --- the judgement, on rounds made by hand: the fault can be seen from tick 3 on --------------------------------
+
+PUSHING = Seen(3, 0.1, Mode.PUSHING, (), 0.0, True)
+
+
+def a_round(*ticks: Seen, exit_code: int = 5, first_bad: int | None = 3) -> LockstepRound:
+    return LockstepRound([PUSHING] * 3 + list(ticks), first_bad, exit_code)
+
+
+def stopped(row: str = "F22") -> Seen:
+    return Seen(3, 0.0, Mode.STOP, (row,), 0.0, True)
+
+
+F22 = Scenario("F22", "by hand")  # STOP within 2 ticks, exit 5
+
+
+def test_the_ticks_to_the_first_zero_are_counted():
+    for late, passes in ((0, True), (1, True), (2, True), (3, False)):
+        proof = judged(F22, a_round(*[PUSHING] * late, stopped(), stopped()))
+        assert (proof.measured_ticks, proof.passed) == (late, passes), proof
+
+
+@pytest.mark.parametrize(
+    ("found", "why"),
+    [
+        (a_round(PUSHING, stopped("F23")), "not named"),
+        (a_round(PUSHING, PUSHING), "not named"),
+        (a_round(stopped(), exit_code=0), "exit code 0"),
+        (a_round(stopped(), first_bad=None), "changed nothing"),
+        (LockstepRound([PUSHING, stopped(), stopped(), stopped()], 3, 5), "before there was evidence"),
+        (a_round(Seen(3, 0.1, Mode.STOP, ("F22",), 0.0, True)), "no command was reduced"),
+        (a_round(Seen(3, 0.05, Mode.STOP, ("F22",), 0.0, True)), "no command was reduced"),
+    ],
+)
+def test_a_row_that_breaks_its_promise_does_not_pass(found, why):
+    proof = judged(F22, found)
+    assert not proof.passed
+    assert why in proof.why
+
+
+def test_a_row_that_slows_needs_a_smaller_command_only():
+    slow = Seen(3, 0.09, Mode.SLOW, ("F50-slow",), 0.0, True)
+    proof = judged(Scenario("F50-slow", "by hand"), a_round(slow))
+    assert (proof.measured_ticks, proof.passed) == (0, True)
+    proof = judged(Scenario("F50-slow", "by hand"), a_round(slow._replace(speed=0.1)))
+    assert not proof.passed
+
+
+def test_a_warning_changes_no_mode_and_has_no_measure():
+    warned = PUSHING._replace(faults=("F60-late",))
+    proof = judged(Scenario("F60-late", "by hand"), a_round(warned, PUSHING))
+    assert (proof.measured_ticks, proof.passed) == (None, True)
+    assert not judged(Scenario("F60-late", "by hand"), a_round(warned._replace(mode=Mode.SLOW))).passed
+
+
+def test_a_refusal_of_the_start_never_moves():
+    refused = Seen(1, 0.0, Mode.STOP, ("R04",), 0.0, True)
+    scenario = Scenario("R04", "by hand", standing=True)
+    assert judged(scenario, LockstepRound([refused], 0, 4)).passed
+    assert not judged(scenario, LockstepRound([refused, refused._replace(speed=0.01)], 0, 4)).passed
