@@ -43,6 +43,11 @@ def operator_stop(after_ticks: int = 0) -> Alter:
     return lambda inp, _state, n: replace(inp, operator=int(Operator.STOP)) if n == after_ticks else inp
 
 
+def lagging(ms: float) -> Alter:
+    """Return the alteration of a bridge whose messages have become older on their way."""
+    return lambda inp, _state, _n: replace(inp, base=replace(inp.base, lag_ns=round(ms * 1e6)))
+
+
 def no_gate_record(inp: TickInput, _state: TickState, n: int) -> TickInput:
     """Show the gate's record as it was just before the moment."""
     return replace(inp, base=replace(inp.base, published_ns=inp.now_ns - (n + 1) * PERIOD_NS))

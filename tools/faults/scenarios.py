@@ -115,6 +115,8 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F31-hold", "no odometry", ("base.odometry.off",)),
     Scenario("F31-stop", "no odometry", ("base.odometry.off",)),
     Scenario("F31-stop", "half-open", ("base.odometry.off", "base.pose.off", "base.status.off")),
+    Scenario("F32-slow", "the bridge lags", alter=do.lagging(61.0)),
+    Scenario("F32-stop", "the bridge lags", alter=do.lagging(121.0)),
     Scenario("F33", "stands still", ("base.command.ignored",), begins=off_by_half),
     Scenario("F33", "obeys another", ("base.command.wrong=0,0.08",), begins=off_by_half),
     Scenario("F33-way", "a quarter too slow", ("base.odometry.scaled=0.75",)),
