@@ -34,7 +34,7 @@ from robot_io.messages import (
 )
 from safety import gate
 from safety.bridge_lag import Lag
-from safety.clock_checks import JUMP_NS
+from safety.checks.clock_checks import JUMP_NS
 from safety.envelope import EnvelopeLimits
 from safety.gate import GateState, Latch
 from safety.motion_bounds import TravelLimits

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Mode, Phase, SafetyState, TickInput
-from safety import (
+from safety.checks import (
     agreement_checks,
     arm_checks,
     base_checks,

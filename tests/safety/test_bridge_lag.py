@@ -11,8 +11,10 @@ from msgspec.structs import replace
 
 from robot_io.messages import BaseOdometry, BodyTwist, Stamped
 from robot_io.tick import ControlState, SafetyState
-from safety import link_checks
 from safety.bridge_lag import Lag
+from safety.checks import (
+    link_checks,
+)
 from safety.envelope import EnvelopeLimits
 from safety.gate_shell import GateShell
 from safety.motion_bounds import TravelLimits

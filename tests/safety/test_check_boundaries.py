@@ -7,7 +7,13 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ControlState, Mode, Phase, SafetyState
-from safety import arm_checks, base_checks, host_checks, sensor_checks, task_checks
+from safety.checks import (
+    arm_checks,
+    base_checks,
+    host_checks,
+    sensor_checks,
+    task_checks,
+)
 from tests.safety.fold_bench import FoldBench
 
 GOOD = FoldBench().good_input()

@@ -9,7 +9,8 @@ from msgspec.structs import replace
 import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
-from safety import (
+from safety import supervisor
+from safety.checks import (
     agreement_checks,
     arm_checks,
     base_checks,
@@ -20,7 +21,6 @@ from safety import (
     motion_checks,
     sensor_checks,
     stuck_checks,
-    supervisor,
     task_checks,
     workspace_checks,
 )
@@ -163,19 +163,19 @@ def test_the_table_says_what_it_means():
 # --- the test of the tests: without its check, a row goes unnoticed -----------------------------------------------
 
 CHECKS = {
-    "safety.force_checks": force_checks,
-    "safety.sensor_checks": sensor_checks,
-    "safety.stuck_checks": stuck_checks,
-    "safety.arm_checks": arm_checks,
-    "safety.base_checks": base_checks,
-    "safety.host_checks": host_checks,
-    "safety.link_checks": link_checks,
-    "safety.clock_checks": clock_checks,
-    "safety.task_checks": task_checks,
+    "safety.checks.force_checks": force_checks,
+    "safety.checks.sensor_checks": sensor_checks,
+    "safety.checks.stuck_checks": stuck_checks,
+    "safety.checks.arm_checks": arm_checks,
+    "safety.checks.base_checks": base_checks,
+    "safety.checks.host_checks": host_checks,
+    "safety.checks.link_checks": link_checks,
+    "safety.checks.clock_checks": clock_checks,
+    "safety.checks.task_checks": task_checks,
     "safety.supervisor": supervisor,
-    "safety.workspace_checks": workspace_checks,
-    "safety.motion_checks": motion_checks,
-    "safety.agreement_checks": agreement_checks,
+    "safety.checks.workspace_checks": workspace_checks,
+    "safety.checks.motion_checks": motion_checks,
+    "safety.checks.agreement_checks": agreement_checks,
 }
 
 

@@ -9,7 +9,10 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, ForceState, Mode, Phase, SafetyState
-from safety import force_checks, stuck_checks
+from safety.checks import (
+    force_checks,
+    stuck_checks,
+)
 from safety.settings import SafetySettings
 from tests.safety.fold_bench import FoldBench, pushing
 from tests.safety.test_check_boundaries import GOOD, NOW

@@ -7,7 +7,10 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, MotionState, Operator, Phase, SafetyState
-from safety import motion_checks, task_checks
+from safety.checks import (
+    motion_checks,
+    task_checks,
+)
 from safety.motion_bounds import in_words, phase_bounds
 from tests.safety.fold_bench import FoldBench, without_contact
 from tools.rig import resolve_rig

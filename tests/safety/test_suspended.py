@@ -11,7 +11,9 @@ from msgspec.structs import replace
 from robot_io import clock
 from robot_io.messages import BodyTwist
 from robot_io.tick import ClockState, Mode, SafetyState
-from safety import clock_checks
+from safety.checks import (
+    clock_checks,
+)
 from safety.envelope import EnvelopeLimits
 from safety.gate import Latch
 from safety.gate_shell import GateShell

@@ -13,7 +13,9 @@ from msgspec.structs import replace
 from robot_io.errors import ConfigError
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ControlState, Phase, SafetyState, WorkspaceState
-from safety import workspace_checks
+from safety.checks import (
+    workspace_checks,
+)
 from safety.settings import SafetySettings
 from safety.workspace import WorkspaceSettings, room_for_push, start_box
 from tests.safety.fold_bench import FoldBench

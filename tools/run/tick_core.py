@@ -11,7 +11,7 @@ from robot_io.messages import BodyTwist, WorldTwist
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, EnvelopeState, Mode, TickInput, TickOutput, TickState
 from safety import envelope
-from safety.base_checks import trusted_pose
+from safety.checks.base_checks import trusted_pose
 from safety.settings import SafetySettings
 from safety.supervisor import give_up, note_command, supervise
 

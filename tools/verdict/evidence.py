@@ -7,7 +7,7 @@ from typing import Any, Literal
 import msgspec
 
 from robot_io.rig.config import RigConfig
-from safety.task_checks import RESIDUAL_N
+from safety.checks.task_checks import RESIDUAL_N
 from tools.verdict.witness import Witness
 
 MOST_LOST_SHARE = 0.1

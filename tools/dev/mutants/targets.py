@@ -18,6 +18,7 @@ class Shell(NamedTuple):
 WHOLE = (
     "control/*.py",
     "safety/*.py",
+    "safety/checks/*.py",
     "robot_io/geometry.py",
     "robot_io/cdr/*.py",
     "robot_io/ft300/codec.py",

@@ -1,0 +1,1 @@
+"""One module a subject: each looks at one tick and returns the rows of the fault table that it finds. Pure."""
