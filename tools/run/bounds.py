@@ -11,7 +11,7 @@ from robot_io.messages import Pose2D
 from robot_io.polygon import longest_line_m
 from robot_io.rig.config import RigConfig
 from safety.faults import FAULTS
-from safety.motion_bounds import TravelLimits, total_bounds
+from safety.motion_bounds import TravelLimits, in_words, phase_bounds, total_bounds
 from safety.stopping import Stopping, stopping
 from safety.workspace import SPARE_AROUND_M, WorkspaceSettings, room_for_push
 from sim_backend.world.scene import place
@@ -24,7 +24,7 @@ def bounds_of(rig: RigConfig) -> dict[str, Any]:
     """Return what bounds a run of this rig: `motion` (m, s), `stopping` (m at m/s), `workspace` (m, WORLD), `pose`."""
     workspace = WorkspaceSettings.of(rig)
     return {
-        "motion": msgspec.to_builtins(total_bounds(rig)),
+        "motion": {**msgspec.to_builtins(total_bounds(rig)), "phases": msgspec.to_builtins(phase_bounds(rig))},
         "stopping": msgspec.to_builtins(stopping(rig, FAULTS.values())),
         "workspace": {
             "given": bool(workspace.given),
@@ -38,7 +38,12 @@ def bounds_of(rig: RigConfig) -> dict[str, Any]:
 
 def bounds_lines(rig: RigConfig) -> list[str]:
     """Return what is said of the bounds at the start of a run."""
-    lines = [_motion_line(total_bounds(rig)), _workspace_line(rig), _stopping_line(stopping(rig, FAULTS.values()))]
+    lines = [
+        in_words(phase_bounds(rig)),
+        _motion_line(total_bounds(rig)),
+        _workspace_line(rig),
+        _stopping_line(stopping(rig, FAULTS.values())),
+    ]
     if rig.base.pose_source == "odometry":
         lines.append("the pose is odometry, so it cannot be checked against it")
     return lines
@@ -81,7 +86,10 @@ def _start(rig: RigConfig, seed: int) -> tuple[Pose2D | None, Pose2D | None]:
 
 
 def _motion_line(most: TravelLimits) -> str:
-    return f"the base moves {most.distance_m:.2f} m and {most.moving_s:.0f} s at most, whatever is measured (F47, F48)"
+    return (
+        f"in all the base moves {most.distance_m:.2f} m and {most.moving_s:.0f} s at most, "
+        "whatever is measured (F47, F48)"
+    )
 
 
 def _workspace_line(rig: RigConfig) -> str:
