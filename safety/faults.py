@@ -7,7 +7,7 @@ tick at which the fault can be seen to the first reduced or zero command that le
 from __future__ import annotations
 
 from enum import StrEnum
-from operator import attrgetter
+from typing import Any
 
 import msgspec
 
@@ -178,7 +178,12 @@ FAULTS: dict[str, Fault] = dict(
 
 def limit_of(fault: Fault, settings: SafetySettings) -> float | None:
     """Return the limit of a row in its unit, None where it has none or it depends on the moment."""
-    return float(attrgetter(fault.limit)(settings)) if isinstance(fault.limit, str) else fault.limit
+    if not isinstance(fault.limit, str):
+        return fault.limit
+    value: Any = settings
+    for name in fault.limit.split("."):
+        value = getattr(value, name)
+    return float(value)
 
 
 def strongest(ids: tuple[str, ...]) -> Mode:

@@ -27,8 +27,7 @@ def bounds_of(rig: RigConfig) -> dict[str, Any]:
     """
     workspace = WorkspaceSettings.of(rig)
     return {
-        "motion": msgspec.to_builtins(total_bounds(rig)),
-        "phases": msgspec.to_builtins(phase_bounds(rig)),
+        "motion": {**msgspec.to_builtins(total_bounds(rig)), "phases": msgspec.to_builtins(phase_bounds(rig))},
         "stopping": msgspec.to_builtins(stopping(rig, FAULTS.values())),
         "workspace": {
             "given": bool(workspace.given),
@@ -43,7 +42,8 @@ def bounds_of(rig: RigConfig) -> dict[str, Any]:
 def bounds_lines(rig: RigConfig) -> list[str]:
     """Return what is said of the bounds at the start of a run."""
     lines = [
-        f"{_motion_line(total_bounds(rig))}; {in_words(phase_bounds(rig))}",
+        in_words(phase_bounds(rig)),
+        _motion_line(total_bounds(rig)),
         _workspace_line(rig),
         _stopping_line(stopping(rig, FAULTS.values())),
     ]
@@ -89,7 +89,10 @@ def _start(rig: RigConfig, seed: int) -> tuple[Pose2D | None, Pose2D | None]:
 
 
 def _motion_line(most: TravelLimits) -> str:
-    return f"the base moves {most.distance_m:.2f} m and {most.moving_s:.0f} s at most, whatever is measured (F47, F48)"
+    return (
+        f"in all the base moves {most.distance_m:.2f} m and {most.moving_s:.0f} s at most, "
+        "whatever is measured (F47, F48)"
+    )
 
 
 def _workspace_line(rig: RigConfig) -> str:

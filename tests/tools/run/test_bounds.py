@@ -77,15 +77,16 @@ def test_blind_is_refused_unless_it_is_asked_for(tmp_path):
 
 
 def test_what_is_said_at_the_start():
-    motion, workspace, stopping = bounds_lines(resolve_rig("sim"))
+    phases, motion, workspace, stopping = bounds_lines(resolve_rig("sim"))
+    assert phases.startswith("motion ends by itself after 0.66 m")  # 1.1 times the approach, and 0.05 m
     assert "at most, whatever is measured (F47, F48)" in motion
     assert "1 m beyond its path" in workspace
     assert "at 0.1 m/s" in stopping
     assert "3.2 cm if this computer dies" in stopping
-    _, workspace, _, pose = bounds_lines(resolve_rig("sim", [*ROOM, "base.pose_source=odometry"]))
+    _, _, workspace, _, pose = bounds_lines(resolve_rig("sim", [*ROOM, "base.pose_source=odometry"]))
     assert "x -2 to 3 m, y -2 to 2 m" in workspace
     assert pose == "the pose is odometry, so it cannot be checked against it"
-    assert "4 corners" in bounds_lines(resolve_rig("sim", ["workspace.polygon_m=[[0,0],[9,0],[9,9],[0,9]]"]))[1]
+    assert "4 corners" in bounds_lines(resolve_rig("sim", ["workspace.polygon_m=[[0,0],[9,0],[9,9],[0,9]]"]))[2]
 
 
 def test_the_same_bounds_are_in_log_summary_and_dry_run(tmp_path):
@@ -102,7 +103,9 @@ def test_the_same_bounds_are_in_log_summary_and_dry_run(tmp_path):
     assert bounds["workspace"]["corners_m"] == [[-2.0, -2.0], [3.0, -2.0], [3.0, 2.0], [-2.0, 2.0]]
     assert bounds["stopping"]["alone_m"] == pytest.approx(0.032)
     most = total_bounds(resolve_rig("sim", ["control.distance_m=0.1"]))
-    assert bounds["motion"] == {"distance_m": most.distance_m, "moving_s": most.moving_s}
+    assert bounds["motion"]["distance_m"] == most.distance_m
+    assert bounds["motion"]["moving_s"] == most.moving_s
+    assert bounds["motion"]["phases"]["retreat_m"] == pytest.approx(1.1 * 0.05 + 0.05)
     assert bounds["pose"] == {"source": "mocap", "checked_against_odometry": True}
     for line in ("workspace: x -2 to 3 m", "stopping distance at 0.1 m/s"):
         assert line in done.stderr
