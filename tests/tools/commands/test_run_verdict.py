@@ -24,6 +24,8 @@ from tools.verdict.judgement import judge
 from tools.verdict.witness import Witness
 
 SIM = ("run", "sim", "--fast", "--json")
+MOCAP_M, MOCAP_RAD = 0.0005, math.radians(0.2)
+"""Noise of the simulated motion capture, 1 sigma; an angle turned is the difference of two."""
 TURNED = (
     *("--set", "control.k_y_rad_per_m=0"),
     *("--set", "world.start.spread=0"),
@@ -84,9 +86,9 @@ def test_a_lost_object_is_told_where_it_stands_not_where_the_pusher_is(tmp_path)
     states = [STATE_CDR.decode(m.payload).slider for m in messages(tmp_path / "run" / "run.mcap", "/world/state")]
     rig = load_rig("sim")
     path = StraightPath.of(rig.path.origin_m, rig.path.direction_deg)
-    assert summary["object_lateral_error_m"] == pytest.approx(path.lateral(states[-1].x, states[-1].y), abs=1e-6)
+    assert summary["object_lateral_error_m"] == pytest.approx(path.lateral(states[-1].x, states[-1].y), abs=5 * MOCAP_M)
     turned = math.remainder(states[-1].yaw - states[0].yaw, math.tau)
-    assert summary["object_turned_rad"] == pytest.approx(turned, abs=1e-6)
+    assert summary["object_turned_rad"] == pytest.approx(turned, abs=5 * math.sqrt(2) * MOCAP_RAD)
     assert abs(summary["object_lateral_error_m"] - summary["lateral_error_m"]) > 0.1
     assert f"the object: {summary['object_lateral_error_m']:+.3f} m" in said
 
