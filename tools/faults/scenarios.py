@@ -50,6 +50,11 @@ def resumed_three_times(_inp: TickInput, state: TickState) -> bool:
     return state.control.resumes >= 3 and state.control.phase == Phase.LOST_HOLD
 
 
+def above_slow(_inp: TickInput, state: TickState) -> bool:
+    """Return whether the filtered force is above the slow limit of 100 N."""
+    return math.hypot(*state.control.force_world) > 100.0
+
+
 def touching(_inp: TickInput, state: TickState) -> bool:
     """Return whether the push has begun."""
     return state.control.phase >= Phase.PUSH
@@ -160,9 +165,10 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F54-stop", "against a wall", ("ft.wrong=0,0,-60", "base.pose.frozen"), settings=FAST),
     Scenario(
         "F54-hold",
-        "four times the usual",
-        ("ft.wrong=0,0,-55",),
-        evidence_ticks=1000,
+        "above the slow limit",
+        ("ft.wrong=0,0,-120",),
+        begins=above_slow,
+        evidence_ticks=999,
         settings=("control.distance_m=3.0",),
     ),
     Scenario("F55-slow", "drifts aside", ("base.odometry.wrong=0,0.04",), edge_beside_m=0.018),
