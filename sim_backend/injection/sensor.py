@@ -39,6 +39,7 @@ class InjectedSensor:
         faults = injection.of("ft")
         self._lost = [fault for fault in faults if fault.word.kind == "lost"]
         self._crc = [fault for fault in faults if fault.word.kind == "crc"]
+        self._dropping = [fault for fault in faults if fault.word.kind in ("off", "slow", "intermittent")]
         self._stages = [_stage(fault, rig) for fault in faults if fault not in self._lost]
         self._gone = False
 
@@ -60,9 +61,10 @@ class InjectedSensor:
         """Return the health under the faults."""
         health = self._sensor.health()
         damaged = sum(fault.changed for fault in self._crc)
-        if damaged:
+        missing = damaged + sum(fault.changed for fault in self._dropping)
+        if missing:
             counters = health.counters | {
-                "packets_ok": health.counters.get("packets_ok", 0) - damaged,
+                "packets_ok": health.counters.get("packets_ok", 0) - missing,
                 "crc_fail": health.counters.get("crc_fail", 0) + damaged,
             }
             health = replace(health, counters=counters)

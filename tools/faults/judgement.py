@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from robot_io.tick import Mode
-from safety.faults import FAULTS, Fault
-from tools.faults.lockstep_round import LockstepRound, Seen
+from safety.faults import FAULTS, Clears, Fault
+from tools.faults.lockstep_round import NOT_ENDED, LockstepRound, Seen
 from tools.faults.scenario import Scenario
 
 LEAST_REDUCTION_M_PER_S = 1e-6
@@ -47,7 +47,7 @@ def judged(scenario: Scenario, found: LockstepRound) -> Proof:
         return result(None, f"named {bad - named} ticks before there was evidence")
     if row.mode == Mode.SILENT:
         return result(None, _of_warning(ticks, named))
-    if row.mode >= Mode.HOLD and found.exit_code != row.exit_code:
+    if row.mode >= Mode.HOLD and found.exit_code not in _codes(row):
         return result(None, f"exit code {found.exit_code} instead of {row.exit_code}")
     if scenario.standing:
         return result(None, "the base moved" if any(seen.speed for seen in ticks[named:]) else "")
@@ -58,6 +58,11 @@ def judged(scenario: Scenario, found: LockstepRound) -> Proof:
         return result(None, "no command was reduced")
     measured = obeyed - bad
     return result(measured, "" if measured <= row.bound_ticks else "too late")
+
+
+def _codes(row: Fault) -> tuple[int, ...]:
+    """Return how the run may end; where a row clears by itself, a fault that lasts may hold the base for ever."""
+    return (row.exit_code,) if row.clears == Clears.LATCHED else (row.exit_code, NOT_ENDED)
 
 
 def _first_bad(scenario: Scenario, found: LockstepRound) -> int | None:

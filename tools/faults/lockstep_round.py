@@ -19,6 +19,8 @@ SETTINGS = ("control.distance_m=1.0",)
 LATER = {Moment.APPROACH: 50, Moment.PUSH: 50, Moment.RETREAT: 40, Moment.END: 0}
 """A fault begins so many ticks after the phase has its full speed, or has begun."""
 PERIOD_NS = 10_000_000
+NOT_ENDED = -1
+"""In place of an exit code."""
 MOST_TICKS = 6000
 """A scenario that has not ended by then does not end by itself."""
 
@@ -116,7 +118,7 @@ def run_lockstep(scenario: Scenario, seed: int = 0) -> LockstepRound:
         settings += ("workspace.x_m=[-50.0, 50.0]", f"workspace.y_m=[-50.0, {y_max!r}]")
     rig = with_faults(_rig(settings), at(scenario.words, from_tick * PERIOD_NS * 1e-9))
     one = FaultyLockstep(rig, seed, scenario, from_tick)
-    code = -1
+    code = NOT_ENDED
     try:
         code = one.run(lambda *_: None)["exit_code"]
     except _TooLong:

@@ -12,6 +12,7 @@ from tools.faults import alterations as do
 from tools.faults.scenario import Moment, Scenario
 
 START, APPROACH, RETREAT, END = Moment.START, Moment.APPROACH, Moment.RETREAT, Moment.END
+FAST = ("control.push_speed_m_per_s=0.3", "control.distance_m=2.0")
 PATIENCE_M = 0.5
 EXPECTED_M = 0.05
 """`path.expected_contact_m` of the shipped rigs."""
@@ -42,6 +43,16 @@ def told_to_stop(_inp: TickInput, state: TickState) -> bool:
 def lost(_inp: TickInput, state: TickState) -> bool:
     """Return whether contact is lost."""
     return state.control.phase in (Phase.LOST, Phase.LOST_HOLD)
+
+
+def resumed_three_times(_inp: TickInput, state: TickState) -> bool:
+    """Return whether three resumes are used up, and the base holds again."""
+    return state.control.resumes >= 3 and state.control.phase == Phase.LOST_HOLD
+
+
+def above_slow(_inp: TickInput, state: TickState) -> bool:
+    """Return whether the filtered force is above the slow limit of 100 N."""
+    return math.hypot(*state.control.force_world) > 100.0
 
 
 def touching(_inp: TickInput, state: TickState) -> bool:
@@ -94,7 +105,7 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F09-before", "drifted", ("ft.wrong=4",), APPROACH),
     Scenario("F09", "moved while pushing", ("ft.wrong=6",), RETREAT, standing=True, evidence_ticks=0),
     Scenario("F10", "not a number", ("ft.garbage",)),
-    Scenario("F11", "it lifts", ("ft.wrong=9",), APPROACH, begins=touching),
+    Scenario("F11", "it lifts", ("ft.wrong=15",), APPROACH, begins=touching),
     Scenario("F12-low", "half of the packets", ("ft.slow=50",)),
     Scenario("F12-hold", "a third of the packets", ("ft.slow=33",)),
     *(Scenario("F20-hold", f"joint {i} has moved", (f"arm.wrong={'0,' * i}0.006",)) for i in range(6)),
@@ -119,7 +130,7 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F32-stop", "the bridge lags", alter=do.lagging(121.0)),
     Scenario("F33", "stands still", ("base.command.ignored",), begins=off_by_half),
     Scenario("F33", "obeys another", ("base.command.wrong=0,0.08",), begins=off_by_half),
-    Scenario("F33-way", "a quarter too slow", ("base.odometry.scaled=0.75",)),
+    Scenario("F33-way", "half as fast", ("base.command.scaled=0.6",)),
     Scenario("F34", "drives on after a stop", ("base.command.frozen",), alter=do.operator_stop(5), begins=told_to_stop),
     Scenario("F35", "three times as fast", ("base.odometry.scaled=3",)),
     Scenario("F36", "a defect in the speed of approach", core=do.too_fast, moment=APPROACH),
@@ -150,15 +161,16 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F51", "21 N m", ("ft.wrong=0,0,0,23",)),
     Scenario("F52", "the object is gone", alter=do.no_contact),
     Scenario("F52-hold", "the object is gone", alter=do.no_contact, begins=lost, evidence_ticks=LOST_TICKS),
-    Scenario("F52-refused", "a fourth time", alter=do.lost_and_resumed),
+    Scenario("F52-refused", "a fourth time", alter=do.lost_and_resumed, begins=resumed_three_times),
     Scenario("F53-early", "much too soon", moment=START, settings=("path.expected_contact_m=0.7",)),
     Scenario("F53", "nothing there", moment=APPROACH, settings=("world.start.gap_m=1.5",), begins=far_beyond),
-    Scenario("F54-stop", "against a wall", ("ft.wrong=0,0,-60", "base.pose.frozen")),
+    Scenario("F54-stop", "against a wall", ("ft.wrong=0,0,-60", "base.pose.frozen"), settings=FAST),
     Scenario(
         "F54-hold",
-        "four times the usual",
-        ("ft.wrong=0,0,-55",),
-        evidence_ticks=1000,
+        "above the slow limit",
+        ("ft.wrong=0,0,-120",),
+        begins=above_slow,
+        evidence_ticks=999,
         settings=("control.distance_m=3.0",),
     ),
     Scenario("F55-slow", "drifts aside", ("base.odometry.wrong=0,0.04",), edge_beside_m=0.018),
