@@ -29,8 +29,8 @@ BASE_DECELERATION_M_PER_S2 = 2.5
 """The limit in its controller; the steps that it takes each tick are shorter than the straight line."""
 ALONE_S = TICK_S + BASE_TIMEOUT_S + BASE_TICK_S
 """The last command may be a tick old when this computer dies."""
-NOT_OF_MOTION = ("R", "F34", "F39")
-"""Nothing moves yet, or the base does not do what it is told: no distance follows from a bound."""
+NOT_OF_MOTION = ("R", "F34", "F39", "F54")
+"""Nothing moves yet, the base does not do what it is told, or it is stuck: no distance follows from a bound."""
 
 
 class Stopping(msgspec.Struct, frozen=True):
