@@ -14,8 +14,8 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
+from control.notes.run_notes import RunNotes
 from control.pacer import wake
-from control.run_notes import RunNotes
 from control.silence import Silence
 from control.timing import LoopTiming
 from robot_io.clock import ClockNs, asleep_ns, monotonic_ns

@@ -12,9 +12,9 @@ from typing import Any
 import msgspec
 
 from robot_io.tick import Mode
-from safety.fault_advice import advice_of
-from safety.fault_measures import measure_of
 from safety.settings import SafetySettings
+from safety.table.fault_advice import advice_of
+from safety.table.fault_measures import measure_of
 
 
 class Clears(StrEnum):

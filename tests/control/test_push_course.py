@@ -2,7 +2,7 @@
 
 import math
 
-from control.push_course import PushCourse
+from control.notes.push_course import PushCourse
 from robot_io.tick import Phase
 
 

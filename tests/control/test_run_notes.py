@@ -6,7 +6,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from control.run_notes import MOST_EVENTS, RunNotes, outcome
+from control.notes.run_notes import MOST_EVENTS, RunNotes, outcome
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, Mode, Phase, TickState
 from tests.safety.fold_bench import PERIOD_NS, FoldBench, pushing

@@ -16,8 +16,8 @@ from tools.places.find_log import find_log
 from tools.replay.difference import Difference
 from tools.replay.fold import ReplayResult, replay
 from tools.replay.verified_log import VerifiedLog
-from tools.run.code_facts import COMMIT_FACT, DIRTY_FACT
-from tools.run.run_facts import code_and_machine
+from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
+from tools.run.facts.run_facts import code_and_machine
 from tools.run.tick_core import TickCore
 
 DIFFERS = ReplayDiffers.exit_code

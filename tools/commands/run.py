@@ -19,8 +19,8 @@ from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
 from tools.run.awake import awake
-from tools.run.bounds import bounds_lines, bounds_of, check_room
-from tools.run.run_facts import level_of
+from tools.run.facts.bounds import bounds_lines, bounds_of, check_room
+from tools.run.facts.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
 from tools.terminal.gain_warning import gain_warning

@@ -74,7 +74,7 @@ PARTS = (
     Part(
         "The contract of a driver",
         "robot_io.driver",
-        ("Driver", "Sensor", "Base", "SensorFacts", "DriverBase", "no_more_options"),
+        ("Driver", "Sensor", "Base", "SharedBase", "SensorFacts", "DriverBase", "no_more_options"),
         "robot_io.driver",
     ),
     Part(

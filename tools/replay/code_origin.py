@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import msgspec
 
 from robot_io.log.log_format import LOG_FORMAT
-from tools.run.code_facts import COMMIT_FACT, DIRTY_FACT, PROGRAM_FACT
+from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT, PROGRAM_FACT
 
 _SHOWN = 12
 

@@ -23,7 +23,7 @@ from tools.replay.derived import DerivedReplay, DerivedReplayer
 from tools.replay.difference import Difference, difference
 from tools.replay.verified_log import VerifiedLog
 from tools.replay.world import PREFIX, WorldReplay, WorldReplayer, WorldTypes
-from tools.run.run_facts import level_of
+from tools.run.facts.run_facts import level_of
 from tools.run.tick_core import TickCore
 
 

@@ -23,7 +23,7 @@ from robot_io.tick import TICK_CDR, ControlTick
 from tools.log.derivation import TICK_TOPIC
 from tools.log.run_log import OFFSET_FACT
 from tools.replay.code_origin import CodeOrigin, compare_code
-from tools.run.code_facts import code_facts
+from tools.run.facts.code_facts import code_facts
 
 MessageT = TypeVar("MessageT", bound=msgspec.Struct)
 DO_DAMAGED = "Do not trust this log from there on; `push log info` shows what it contains"

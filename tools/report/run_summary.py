@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from control.run_notes import outcome
+from control.notes.run_notes import outcome
 from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
 from robot_io.tick import Phase
 from tools.kinds import device_names

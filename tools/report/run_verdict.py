@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from control.push_course import PushCourse
-from control.run_notes import outcome
+from control.notes.push_course import PushCourse
+from control.notes.run_notes import outcome
 from robot_io.tick import ControlTick, Mode
 from safety.faults import FAULTS
 from tools.report.run_data import RunData

@@ -14,7 +14,7 @@ import time
 import msgspec
 
 from control.loop import ControlLoop, Watch
-from control.run_notes import outcome
+from control.notes.run_notes import outcome
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.driver import Sensor
 from robot_io.errors import EnvironmentFault, PushError

@@ -31,7 +31,7 @@ from tools.places import run_dir
 from tools.places.atomic_file import write_json
 from tools.places.running import announce, forget
 from tools.places.saved_tare import SavedTare
-from tools.run.figures_from_log import figures_from_log
+from tools.run.facts.figures_from_log import figures_from_log
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys

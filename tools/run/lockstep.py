@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from msgspec.structs import astuple, replace
 
 from control.loop import ft_input
-from control.run_notes import RunNotes, outcome
+from control.notes.run_notes import RunNotes, outcome
 from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
@@ -39,7 +39,7 @@ from tools.kinds import is_shipped, name_of
 from tools.log.run_log import RunLog
 from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
-from tools.run.run_facts import run_facts
+from tools.run.facts.run_facts import run_facts
 from tools.run.run_state import initial_state
 from tools.run.tick_core import TickCore, tick_message
 

@@ -39,11 +39,11 @@ from safety.settings import SafetySettings
 from tools.kinds import is_shipped
 from tools.places.saved_tare import SavedTare
 from tools.rig import devices_at, faults_of
+from tools.run.facts.run_facts import run_facts
 from tools.run.injected_gate import InjectedGateJob
 from tools.run.jobs import ArmKindJob, ControlJob, EmulatorJob
 from tools.run.recorder import Job as RecorderJob
 from tools.run.recorder import RingSource
-from tools.run.run_facts import run_facts
 
 RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes without a drain by the recorder."""

@@ -36,7 +36,7 @@ class TrustItem(msgspec.Struct, frozen=True):
 
 
 def gather(rig: RigConfig, figures: dict[str, Any], witness: Witness) -> list[TrustItem]:
-    """Return the evidence of a run, from its figures (`control.run_notes`) and from what else is known of it."""
+    """Return the evidence of a run, from its figures (`control.notes.run_notes`) and from what else is known of it."""
     items = [
         *_line(rig, figures),
         *_contact(figures),

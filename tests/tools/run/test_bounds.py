@@ -13,7 +13,7 @@ from safety.motion_bounds import total_bounds
 from tests.replay.runs import push
 from tools.commands.run import blind_words
 from tools.rig import resolve_rig
-from tools.run.bounds import bounds_lines, check_room
+from tools.run.facts.bounds import bounds_lines, check_room
 from tools.run.lockstep import Lockstep
 
 ROOM = ("workspace.x_m=[-2, 3]", "workspace.y_m=[-2, 2]")

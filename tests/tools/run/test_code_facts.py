@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tools.run import code_facts
-from tools.run.code_facts import commit_of
+from tools.run.facts import code_facts
+from tools.run.facts.code_facts import commit_of
 
 ROOT = Path(__file__).resolve().parents[3]
 

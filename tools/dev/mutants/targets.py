@@ -17,6 +17,7 @@ class Shell(NamedTuple):
 
 WHOLE = (
     "control/*.py",
+    "control/notes/*.py",
     "safety/*.py",
     "safety/checks/*.py",
     "robot_io/geometry.py",

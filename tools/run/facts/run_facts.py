@@ -6,8 +6,8 @@ import json
 import platform
 
 from robot_io.rig.config import RigConfig
-from tools.run.bounds import bounds_of
-from tools.run.code_facts import code_facts
+from tools.run.facts.bounds import bounds_of
+from tools.run.facts.code_facts import code_facts
 
 
 def code_and_machine() -> dict[str, str]:

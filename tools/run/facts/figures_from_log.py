@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from control.run_notes import RunNotes, outcome
+from control.notes.run_notes import RunNotes, outcome
 from robot_io.errors import LogDamaged
 from robot_io.log.messages import GATE_SAYS, SAFETY_EVENT, SafetyEvent
 from robot_io.mcap.read import read_log

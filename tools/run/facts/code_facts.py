@@ -13,7 +13,7 @@ from robot_io.log.log_format import FORMAT_FACT, LOG_FORMAT
 
 COMMIT_FACT, DIRTY_FACT, PROGRAM_FACT = "commit", "dirty", "program"
 GIT_MAX_S = 0.2
-_CHECKOUT = Path(__file__).resolve().parents[2]
+_CHECKOUT = Path(__file__).resolve().parents[3]
 _PACKAGES = ("numpy", "mcap", "msgspec", "ur-rtde")
 # Read only: git writes nothing into the repository and starts no program that its settings name.
 _GIT = ("git", "--no-optional-locks", "-c", "core.fsmonitor=false", "status", "--porcelain=v2", "--branch", "-uno")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from control.push_course import PushCourse
+from control.notes.push_course import PushCourse
 from robot_io.tick import Mode, Phase, TickInput, TickOutput, TickState
 
 MOST_EVENTS = 200

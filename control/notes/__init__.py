@@ -1,0 +1,1 @@
+"""What is noted of a whole run while it ticks: events, counts, how it went beside its path."""
