@@ -21,10 +21,10 @@ from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
-from robot_io.rig.task import FaultsConfig, GoalConfig, WorkspaceConfig
+from robot_io.rig.task import FaultsConfig, GoalConfig, PathConfig, SlidersConfig, WorkspaceConfig
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
-from robot_io.rig.types import InBase, InRoom, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
+from robot_io.rig.types import InBase, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
 from robot_io.rig.world import WorldConfig
 
 RIGS_DIR = Path(__file__).parent
@@ -117,25 +117,6 @@ class FramesConfig(Table, frozen=True):
     contact_in_base_m: InBase
     sensor_in_base_m: InBase
     base_from_marker: InBase = (0.0, 0.0, 0.0)
-
-
-class PathConfig(Table, frozen=True):
-    """The straight path in the WORLD frame: a point on it (from which distance is expected) and its direction."""
-
-    origin_m: InRoom = (0.0, 0.0)
-    direction_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
-    expected_contact_m: Annotated[float, Meta(ge=0, le=2)] = 0.05
-    """Distance from where the approach starts to where the object is expected."""
-
-
-class SlidersConfig(Table, frozen=True):
-    """What this rig is meant to push, boxes and barrels: `push run` warns of gains with little margin for some."""
-
-    shortest_m: Positive = 0.3
-    """Length along the push, or diameter, of the smallest ..."""
-    longest_m: Positive = 0.5
-    """... and of the largest."""
-    pressure: Literal["uniform", "rim", "point"] = "uniform"
 
 
 class ControlConfig(Table, frozen=True):

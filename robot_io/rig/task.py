@@ -1,13 +1,32 @@
-"""Where a push may go, what counts as reached, and what goes wrong on demand: `[workspace]`, `[goal]`, `[faults]`."""
+"""What is to be done: `[path]`, `[sliders]`, `[workspace]`, `[goal]` of a rig file, and `[faults]` on demand."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
 from robot_io.polygon import Polygon, flaw
-from robot_io.rig.types import InRoom, Table
+from robot_io.rig.types import InRoom, Positive, Table
+
+
+class PathConfig(Table, frozen=True):
+    """The straight path in the WORLD frame: a point on it (from which distance is expected) and its direction."""
+
+    origin_m: InRoom = (0.0, 0.0)
+    direction_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
+    expected_contact_m: Annotated[float, Meta(ge=0, le=2)] = 0.05
+    """Distance from where the approach starts to where the object is expected."""
+
+
+class SlidersConfig(Table, frozen=True):
+    """What this rig is meant to push, boxes and barrels: `push run` warns of gains with little margin for some."""
+
+    shortest_m: Positive = 0.3
+    """Length along the push, or diameter, of the smallest ..."""
+    longest_m: Positive = 0.5
+    """... and of the largest."""
+    pressure: Literal["uniform", "rim", "point"] = "uniform"
 
 
 class WorkspaceConfig(Table, frozen=True):

@@ -11,9 +11,9 @@ from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
+from tools.commands.run_outputs import save_tare, write_report, write_summary
 from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
-from tools.places.atomic_file import write_json
 from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
@@ -278,34 +278,3 @@ def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, 
 def unused_faults(summary: dict[str, Any]) -> list[str]:
     """Return the faults to inject that changed nothing."""
     return [words for words, changed in summary.get("injected", {}).items() if changed == 0]
-
-
-def save_tare(rig: RigConfig, figures: dict[str, Any]) -> None:
-    """Save the tare, if the run got that far, for `--start-in-contact`; print a message if that fails."""
-    if figures["tared"]:
-        bias = (*figures["bias_force_N"], *figures["bias_torque_Nm"])
-        try:
-            saved_tare.save(rig, bias, tuple(figures["held_joints_rad"]))
-        except (OSError, EnvironmentFault) as error:
-            tell(f"the tare was not saved: {error}")
-
-
-def write_summary(summary: dict[str, Any], out: Path) -> None:
-    """Write summary.json; print a message if that fails: the verdict is printed in any case."""
-    try:
-        write_json(out / "summary.json", summary)
-    except OSError as error:
-        tell(f"summary.json cannot be written: {error.strerror}")
-
-
-def write_report(summary: dict[str, Any], out: Path, ready: ReportProcess | None) -> None:
-    """Write report.html, with the process `ready` or a new one, and name it in `summary`."""
-    try:
-        making = ready or ReportProcess(Path(summary["log"]), out / "report.html")
-        reason = making.make()
-    except EnvironmentFault as fault:
-        reason = str(fault)
-    if reason:
-        tell(f"no report: {reason}; `push report {out}` makes one from the log")
-    else:
-        summary["report"] = str(out / "report.html")

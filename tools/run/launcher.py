@@ -115,13 +115,9 @@ class Launcher:
 
     def witness(self, figures: dict[str, Any]) -> Witness:
         """Return what the other processes say of the run, once `run` has returned."""
-        recorder, gate = self._children["recorder"], self._children["gate"]
-        return witness_of(
-            self.log,
-            figures["loop"]["ticks"],
-            recorder=recorder.finished or f"the recorder process {recorder.how_it_ended()}",
-            gate=gate.finished or f"the gate process {gate.how_it_ended()}",
-        )
+        children = (self._children[name] for name in ("recorder", "gate"))
+        recorder, gate = (child.finished or f"the {child.name} process {child.how_it_ended()}" for child in children)
+        return witness_of(self.log, figures["loop"]["ticks"], recorder=recorder, gate=gate)
 
     def pushed(self) -> ObjectPose | None:
         """Return where the object is, once `run` has returned; None if that is not known."""

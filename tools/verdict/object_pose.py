@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from robot_io.geometry import StraightPath, wrap_angle
 from robot_io.messages import Pose2D
-from robot_io.rig.config import PathConfig
+from robot_io.rig.task import PathConfig
 
 
 class ObjectPose(NamedTuple):

@@ -25,7 +25,7 @@ from robot_io.mcap.read import read_log, read_summary
 from robot_io.rig.config import RigConfig, load_rig, rig_from_toml, rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick, Phase
 from tools.cli import main
-from tools.commands import run as run_command
+from tools.commands import run_outputs
 from tools.log.run_log import RunLog
 from tools.report import process as report_process
 from tools.report.page import page, run_mark, write_report
@@ -368,13 +368,13 @@ def test_push_report_of_what_is_no_log(tmp_path, capsys, content, code):
 def test_a_report_that_fails_is_said_and_fails_nothing(tmp_path, capsys, monkeypatch):
     (tmp_path / "run.mcap").write_bytes(b"nonsense")
     summary: dict[str, Any] = {"log": str(tmp_path / "run.mcap"), "report": None}
-    run_command.write_report(summary, tmp_path, None)
+    run_outputs.write_report(summary, tmp_path, None)
     assert summary["report"] is None
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "this is not an MCAP file" in said
     monkeypatch.setattr(report_process, "TIMEOUT_S", 0.001)
-    run_command.write_report(summary, tmp_path, None)
+    run_outputs.write_report(summary, tmp_path, None)
     assert summary["report"] is None
     assert "took longer than" in capsys.readouterr().err
 

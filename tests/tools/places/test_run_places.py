@@ -8,7 +8,7 @@ import pytest
 
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.rig.config import load_rig
-from tools.commands import run as run_command
+from tools.commands import run_outputs
 from tools.places import run_dir, saved_tare
 from tools.places.atomic_file import write_json
 from tools.places.state_dir import state_dir
@@ -75,7 +75,7 @@ def test_a_tare_that_cannot_be_kept_does_not_take_the_verdict_with_it(state, cap
         "bias_torque_Nm": [0.1, 0.2, 0.3],
         "held_joints_rad": [0.0] * 6,
     }
-    run_command.save_tare(rig, figures)
+    run_outputs.save_tare(rig, figures)
     assert "the tare was not saved" in capsys.readouterr().err
 
 
@@ -97,7 +97,7 @@ def test_nor_does_a_state_folder_that_cannot_be_made(tmp_path, monkeypatch, caps
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
     figures = {"tared": True, "bias_force_N": [0.0] * 3, "bias_torque_Nm": [0.0] * 3, "held_joints_rad": [0.0] * 6}
-    run_command.save_tare(load_rig("sim"), figures)
+    run_outputs.save_tare(load_rig("sim"), figures)
     said = capsys.readouterr().err
     assert "the tare was not saved" in said
     assert "XDG_STATE_HOME" in said

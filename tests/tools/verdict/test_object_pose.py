@@ -5,7 +5,7 @@ import math
 import pytest
 
 from robot_io.messages import Pose2D
-from robot_io.rig.config import PathConfig
+from robot_io.rig.task import PathConfig
 from tools.verdict.object_pose import object_pose
 
 
