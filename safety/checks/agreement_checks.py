@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from robot_io.geometry import rotated
 from robot_io.tick import ControlState, Mode, MotionMark, MotionState, SafetyState, TickInput
+from safety.checks.stuck_checks import STUCK_SHARE
 from safety.finding import Finding
 from safety.settings import SafetySettings
 
@@ -32,6 +33,9 @@ DIRECTION_M = 0.01
 """A shorter way has no direction."""
 STILL_M, STILL_WAY_M = 0.005, 0.01
 """A pose that keeps within this of one place, over this way by odometry, stands still (F43)."""
+
+STUCK_WAIT_M = 0.08
+"""Over this commanded way at most, a pose that disagrees under a large force is left to F54."""
 
 FLOOR_M = 0.006
 """Noise of two poses (0.5 mm each) eight times over."""
@@ -81,10 +85,8 @@ def check(
         motion = _note_place(
             replace(motion, pose_ns=state.pose_ns, pose_run=motion.pose_run + 1 if off > 1.0 else 0), now
         )
-        if motion.pose_run >= RUN and _way_at_one_place(motion) > STILL_WAY_M:
-            faults.append(Finding("F43", off))
-        elif motion.pose_run >= RUN:
-            faults.append(Finding("F37", off))
+        if motion.pose_run >= RUN and not _perhaps_stuck(state, inp):
+            faults.append(Finding("F43" if _way_at_one_place(motion) > STILL_WAY_M else "F37", off))
     off = max(_of_command(mark, now, inp) for mark in motion.marks)
     motion = replace(motion, command_run=motion.command_run + 1 if off > 1.0 else 0)
     if motion.command_run >= RUN:
@@ -150,6 +152,15 @@ def _note_place(motion: MotionState, now: MotionMark) -> MotionState:
 def _way_at_one_place(motion: MotionState) -> float:
     """Return the way by odometry (m) since the pose came to the place where it still is."""
     return math.hypot(motion.way_x - motion.still_way_x, motion.way_y - motion.still_way_y)
+
+
+def _perhaps_stuck(state: SafetyState, inp: TickInput) -> bool:
+    """Return whether a large force may be what keeps the pose where it is, so that F54 has to name it."""
+    force, pose = state.force, inp.base.pose
+    if not force.stuck_since_ns or math.hypot(force.sent_x, force.sent_y) > STUCK_WAIT_M:
+        return False
+    way = (pose.x - force.from_x) * force.sent_x + (pose.y - force.from_y) * force.sent_y
+    return way < STUCK_SHARE * (force.sent_x**2 + force.sent_y**2)
 
 
 def _of_pose(then: MotionMark, now: MotionMark, inp: TickInput) -> float:

@@ -50,9 +50,9 @@ def resumed_three_times(_inp: TickInput, state: TickState) -> bool:
     return state.control.resumes >= 3 and state.control.phase == Phase.LOST_HOLD
 
 
-def above_slow(_inp: TickInput, state: TickState) -> bool:
-    """Return whether the filtered force is above the slow limit of 100 N."""
-    return math.hypot(*state.control.force_world) > 100.0
+def heavy(_inp: TickInput, state: TickState) -> bool:
+    """Return whether the filtered force is above 50 N: three times the usual one, and more."""
+    return math.hypot(*state.control.force_world) > 50.0
 
 
 def touching(_inp: TickInput, state: TickState) -> bool:
@@ -164,12 +164,12 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F52-refused", "a fourth time", alter=do.lost_and_resumed, begins=resumed_three_times),
     Scenario("F53-early", "much too soon", moment=START, settings=("path.expected_contact_m=0.7",)),
     Scenario("F53", "nothing there", moment=APPROACH, settings=("world.start.gap_m=1.5",), begins=far_beyond),
-    Scenario("F54-stop", "against a wall", ("ft.wrong=0,0,-60", "base.pose.frozen"), settings=FAST),
+    Scenario("F54-stop", "against a wall", ("ft.wrong=0,0,-60", "base.pose.frozen")),
     Scenario(
         "F54-hold",
-        "above the slow limit",
+        "three times the usual force",
         ("ft.wrong=0,0,-120",),
-        begins=above_slow,
+        begins=heavy,
         evidence_ticks=999,
         settings=("control.distance_m=3.0",),
     ),
