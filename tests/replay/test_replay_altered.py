@@ -303,9 +303,9 @@ def test_what_was_at_one_time_cannot_be_moved_to_another(edit, topic, sim_log, t
 
 
 IDLE_SETTINGS = {
-    "gain that had nothing to do": ("heading_gain_per_s = 1.0", "heading_gain_per_s = 1.01"),
+    "turn that was not needed": ("lost_turn_rate_rad_per_s = 0.2", "lost_turn_rate_rad_per_s = 0.21"),
     "limit that was not reached": ("max_force_N = 150.0", "max_force_N = 149.0"),
-    "threshold": ("force_min_N = 5.0", "force_min_N = 5.01"),
+    "patience": ("lost_rest_s = 2.0", "lost_rest_s = 2.1"),
     "noise": ("noise_torque_Nm = 0.03", "noise_torque_Nm = 0.04"),
     "name": ('name = "sim"', 'name = "sim2"'),
 }

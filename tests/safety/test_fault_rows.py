@@ -80,7 +80,7 @@ def test_the_row_is_noticed_in_time_and_reacted_to(scenario):
 EVIDENCE = {
     "F01-slow": 5, "F01-hold": 8, "F01-stop": 16, "F06": 30, "F21": 1, "F24-hold": 4, "F25-hold": 4, "F25-stop": 10,
     "F31-hold": 10, "F31-stop": 25, "F33": 30, "F34": 34, "F35": 3, "F38-late": 300, "F40-slow": 5, "F40-stop": 12,
-    "F41": 2, "F49": 2, "F56": 20, "F63": 100, "F63 records lost": 0, "F73-hold": 50, "F73-stop": 200,
+    "F41": 2, "F49": 3, "F56": 20, "F63": 100, "F63 records lost": 0, "F73-hold": 50, "F73-stop": 200,
     "F67-late": 10, "F24-stop no record": 10, "F60-slow three in a row": 2, "R01": 1,
     "F04 half of the packets": 8, "F04 one in four": 16, "F08": 1, "F11": 19, "F11 pulls": 18, "F12-low": 86,
     "F12-hold": 86, "F52": 1, "F52-hold": 1, "F54-stop": 48,

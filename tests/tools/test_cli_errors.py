@@ -80,6 +80,7 @@ def test_codes_are_the_documented_ones():
         "DeviceNotReady": 4,
         "SafetyStop": 5,
         "ContactLost": 6,
+        "NotDone": 9,
         "ReplayDiffers": 7,
         "LogDamaged": 8,
         "OperatorStop": 130,

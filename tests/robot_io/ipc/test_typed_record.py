@@ -2,6 +2,7 @@
 
 import math
 import os
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -41,6 +42,11 @@ BASE = BaseRecord(
     latched=True,
     latch_cause=11,
     published_ns=112,
+    travel_m=1.13,
+    moving_s=11.4,
+    object_pose=Pose2D(2.25, -1.5, 0.75),
+    object_received_ns=115,
+    lag_ns=116,
 )
 ARM = ArmRecord(
     joints=JointState(
@@ -122,8 +128,13 @@ def test_a_short_payload_is_refused() -> None:
         ARM_RECORD.decode(ARM_RECORD.encode(ARM)[:-1])
 
 
-def test_the_object_is_not_in_the_record() -> None:
-    assert not [name for name in BaseRecord.__struct_fields__ if "slider" in name or "object" in name]
+def test_control_never_reads_where_the_object_is() -> None:
+    """Its pose is in the record for the workspace only; the law has nothing but the force."""
+    fields = [name for name in BaseRecord.__struct_fields__ if "slider" in name or "object" in name]
+    assert fields == ["object_pose", "object_received_ns"]
+    sources = list((Path(__file__).parents[3] / "control").rglob("*.py"))
+    assert len(sources) > 10
+    assert not [path.name for path in sources if any(field in path.read_text("utf-8") for field in fields)]
 
 
 def through(message_type, value):
