@@ -19,6 +19,7 @@ from safety.envelope import EnvelopeLimits
 from safety.gate_shell import GateShell
 from safety.motion_bounds import TravelLimits
 from safety.settings import SafetySettings
+from tests.host_watch import repeated_when_the_host_stalls
 from tests.safety.fold_bench import FoldBench
 from tests.safety.test_gate_alone import Gate
 from tests.wire.bridge_process import running_bridge
@@ -122,7 +123,8 @@ def test_the_gate_puts_it_into_its_record():
     assert shell.record.lag_ns == pytest.approx(80 * MS, abs=MS)
 
 
-def test_on_the_wire():
+@repeated_when_the_host_stalls
+def test_on_the_wire(tmp_path):
     """An emulated bridge that holds everything back by 90 ms, after a second without."""
     with running_bridge() as bridge, contextlib.closing(Gate(bridge.url)) as gate:
         gate.wait_ready()

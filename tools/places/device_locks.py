@@ -14,9 +14,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from robot_io.errors import DeviceUnreachable, EnvironmentFault
-from robot_io.ft300.tcp_link import is_tcp_address
 from robot_io.look_up import addresses_of
-from robot_io.ridgeback.open_socket import parse_url
 from robot_io.rig.config import RigConfig
 from tools.kinds import is_shipped
 from tools.places.state_dir import state_dir
@@ -109,6 +107,8 @@ def _holder(fd: int) -> str:
 
 
 def _sensor_keys(port: str) -> list[str]:
+    from robot_io.ft300.tcp_link import is_tcp_address  # level sim imports no wire
+
     if is_tcp_address(port):
         parts = urlsplit(port)
         return _host_keys(parts.hostname or "", f":{parts.port}")
@@ -125,6 +125,8 @@ def _arm_keys(host: str) -> list[str]:
 
 
 def _base_keys(url: str) -> list[str]:
+    from robot_io.ridgeback.open_socket import parse_url  # level sim imports no wire
+
     parts = parse_url(url)
     return _host_keys(parts.host, f":{parts.port}")
 

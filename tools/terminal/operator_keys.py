@@ -41,7 +41,7 @@ class OperatorKeys:
         self._terminal: list[Any] | None = None
         self._stdin = -1
         with contextlib.suppress(OSError, ValueError, AttributeError, termios.error):
-            if sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp():
+            if sys.stdin.isatty() and not _in_background(sys.stdin.fileno()):
                 self._stdin = sys.stdin.fileno()
                 self._terminal = termios.tcgetattr(self._stdin)
                 tty.setcbreak(self._stdin)
@@ -79,6 +79,14 @@ class OperatorKeys:
             self._on_resume()
         else:
             self._on_stop()
+
+
+def _in_background(terminal: int) -> bool:
+    """Return whether another job of the shell has the terminal; one that controls no session has no jobs."""
+    try:
+        return os.tcgetpgrp(terminal) != os.getpgrp()
+    except OSError:
+        return False
 
 
 def _note(_number: int, _frame: FrameType | None) -> None:

@@ -75,7 +75,7 @@ def test_the_record_is_the_newest_and_nobody_before_the_first(link):
         pose=Pose2D(1.0, 2.0, 0.5), pose_valid=True, pose_received_ns=5, pose_seq=6, odometry=TWIST,
         odometry_received_ns=7, odometry_seq=8, status=BaseStatus(False, True, 26.5), status_received_ns=9,
         newest_inbound_ns=10, newest_pong_ns=11, accepted_seq=12, verdict=3, sent=TWIST, sent_ns=13, latched=True,
-        latch_cause=11, published_ns=14,
+        latch_cause=11, published_ns=14, object_pose=Pose2D(3.0, 4.0, 0.25),
     )  # fmt: skip
     link.record.publish(NO_BASE)
     link.record.publish(record)

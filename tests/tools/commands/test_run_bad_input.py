@@ -11,7 +11,7 @@ import pytest
 import serial
 
 from tests.host_watch import repeated_when_the_host_stalls
-from tests.push_runs import QUICK, finished, one_error, started
+from tests.push_runs import QUICK, finished, one_error
 from tests.wire.bridge_process import running_bridge
 from tests.wire.ft300_process import ft300_process
 from tests.wire.ur_process import EmulatorProcess as UrProcess
@@ -235,12 +235,3 @@ def test_a_sensor_that_already_streams_and_never_changes_is_read_and_refused_as_
         assert "R02-dead" in summary["fault_counts"]
         assert summary["devices"]["ft300"]["packets_ok"] > 30
         assert sensor.ask("counters")["streaming"] is False, "stopped, so that the next one finds it answering"
-
-
-def test_the_same_rig_is_one_at_a_time_whatever_its_file(state, tmp_path):
-    rig = tmp_path / "again.toml"
-    rig.write_text('extends = "emulated"\n')
-    with started(state, "run", "emulated", *QUICK, "--out", str(tmp_path / "first")) as first:
-        first.wait_for("base  emulated")
-        error = push_fails(state, tmp_path, 3, str(rig))
-        assert str(first.process.pid) in error["what"]

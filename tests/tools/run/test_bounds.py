@@ -77,8 +77,8 @@ def test_blind_is_refused_unless_it_is_asked_for(tmp_path):
 
 
 def test_what_is_said_at_the_start():
-    phases, motion, workspace, stopping = bounds_lines(resolve_rig("sim"))
-    assert phases.startswith("motion ends by itself after 0.66 m")  # 1.1 times the approach, and 0.05 m
+    motion, phases, workspace, stopping = bounds_lines(resolve_rig("sim"))
+    assert "at most 0.66 m or 28 s of approach" in phases  # 1.1 times the approach, and 0.05 m
     assert "at most, whatever is measured (F47, F48)" in motion
     assert "1 m beyond its path" in workspace
     assert "at 0.1 m/s" in stopping

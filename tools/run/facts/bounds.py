@@ -42,8 +42,8 @@ def bounds_of(rig: RigConfig) -> dict[str, Any]:
 def bounds_lines(rig: RigConfig) -> list[str]:
     """Return what is said of the bounds at the start of a run."""
     lines = [
-        in_words(phase_bounds(rig)),
         _motion_line(total_bounds(rig)),
+        in_words(phase_bounds(rig)),
         _workspace_line(rig),
         _stopping_line(stopping(rig, FAULTS.values())),
     ]
