@@ -145,6 +145,7 @@ def wait_for_only(run, pids, left, within_s):
         time.sleep(0.05)
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_launcher_frozen(state, tmp_path, host):
     """Nobody holds the operator's keys: held after 0.5 s, stopped after 2 s; 5 s after that only the frozen one is."""
@@ -168,6 +169,7 @@ def test_launcher_frozen(state, tmp_path, host):
     replays(tmp_path / "run")
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_launcher_frozen_for_a_moment(state, tmp_path, host):
     """The base holds and goes on by itself."""
@@ -182,6 +184,7 @@ def test_launcher_frozen_for_a_moment(state, tmp_path, host):
     assert ended.last_object["fault_counts"]["F73-hold"] == 1
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_launcher_frozen_before_the_start(state, tmp_path, host):
     """Devices are open and nothing has moved: the processes end without it."""
@@ -200,6 +203,7 @@ def test_launcher_frozen_before_the_start(state, tmp_path, host):
     assert "the launcher was frozen for 2 s before the start" in error["what"]
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_recorder_frozen(state, tmp_path, host):
     found = strike(state, tmp_path / "run", "recorder", STOP, host, log="recovered.mcap")

@@ -75,6 +75,7 @@ MADE_FOR_ONE_SPEED = ("F37",)
 """Its scenarios shift the pose by so much a second; at a higher speed that is a smaller share of the way."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.3, 0.5])
 @pytest.mark.parametrize(
     "scenario",

@@ -180,6 +180,7 @@ def test_in_contact_without_a_tare_is_refused(tmp_path):
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_two_emulated_runs_share_nothing_and_stops_are_clean(state, tmp_path, host):
     with started(state, "run", "emulated", *QUICK, "--out", str(tmp_path / "first"), "--json", host=host) as first:

@@ -75,7 +75,12 @@ def test_no_fault_is_injected_where_a_device_is_real(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "fault"), [(FROZEN, "F06"), ("base.pose.off at 5 s", "F40-stop"), ("arm.protective-stop at 5 s", "F22")]
+    ("words", "fault"),
+    [
+        (FROZEN, "F06"),
+        pytest.param("base.pose.off at 5 s", "F40-stop", marks=pytest.mark.long),
+        pytest.param("arm.protective-stop at 5 s", "F22", marks=pytest.mark.long),
+    ],
 )
 @repeated_when_the_host_stalls
 def test_the_same_words_at_level_emulated(tmp_path, host, words, fault):

@@ -27,7 +27,7 @@ def emulated(folder, *more):
 
 
 @repeated_when_the_host_stalls
-@pytest.mark.parametrize("asked", [(), ("emulated",)])
+@pytest.mark.parametrize("asked", [(), pytest.param(("emulated",), marks=pytest.mark.long)])
 def test_a_run_under_way_is_stopped(state, tmp_path, host, asked):
     with started(state, *emulated(tmp_path / "run"), host=host) as run:
         run.wait_for("PUSH ")
@@ -40,6 +40,7 @@ def test_a_run_under_way_is_stopped(state, tmp_path, host, asked):
     assert stands(world_of(tmp_path / "run" / "run.mcap")[1][-1][1])
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_a_run_of_another_rig_goes_on(state, tmp_path, host):
     with started(state, *emulated(tmp_path / "run"), host=host) as run:
@@ -54,7 +55,7 @@ def test_a_run_of_another_rig_goes_on(state, tmp_path, host):
         run.wait(10.0)
 
 
-@pytest.mark.parametrize("frozen", ["launcher", "control"])
+@pytest.mark.parametrize("frozen", ["launcher", pytest.param("control", marks=pytest.mark.long)])
 @repeated_when_the_host_stalls
 def test_a_frozen_process_does_not_keep_it_from_stopping(state, tmp_path, host, frozen):
     with started(state, *emulated(tmp_path / "run"), host=host) as run:
