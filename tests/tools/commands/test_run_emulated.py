@@ -24,6 +24,8 @@ from tests.push_runs import PUSH, QUICK, ROOT, Run, finished, messages, one_erro
 from tests.wire.ur_process import wait_until
 
 DISTANCE_M = 0.2
+POSE_NOISE_M = 0.0025
+"""Five times the noise of the shipped motion capture: the distance is that of the last pose, not of the best one."""
 FILES = {"run.mcap", "config.toml", "summary.json", "processes.json"}
 
 
@@ -71,7 +73,7 @@ def test_the_verdict(done, folder):
     summary = done.last_object
     assert summary["schema"] == 1
     assert (summary["verdict"], summary["exit_code"]) == ("done", 0)
-    assert DISTANCE_M <= summary["distance_m"] < DISTANCE_M + 0.05
+    assert DISTANCE_M - POSE_NOISE_M <= summary["distance_m"] < DISTANCE_M + 0.05
     assert abs(summary["lateral_error_m"]) < 0.1
     assert summary["log"] == str(folder / "run.mcap")
     assert summary["contact_seen"] is True
@@ -161,7 +163,7 @@ def test_in_contact_with_the_tare_of_the_run_before(done, state, tmp_path, host)
         host=host,
     )
     assert ended.code == 0, ended.err
-    assert ended.last_object["distance_m"] >= 0.1
+    assert ended.last_object["distance_m"] >= 0.1 - POSE_NOISE_M
     controls = [
         TICK_CDR.decode(message.payload).after.control
         for message in messages(tmp_path / "run" / "run.mcap", "/control/tick")
@@ -387,7 +389,7 @@ def test_six_metres_with_force_feedback(state, tmp_path, host):
         state, "run", "emulated", "--distance-m", "6", "--out", str(out), "--json", within_s=200.0, host=host
     )
     assert ended.code == 0, ended.err
-    assert ended.last_object["distance_m"] >= 6.0
+    assert ended.last_object["distance_m"] >= 6.0 - POSE_NOISE_M
     ticks = [TICK_CDR.decode(message.payload) for message in messages(out / "run.mcap", "/control/tick")]
     pushing = [tick.after.control for tick in ticks if tick.after.control.contact_seen]
     assert max(abs(control.lateral_m) for control in pushing) < 0.5
