@@ -157,7 +157,8 @@ def test_a_sensor_that_drifts_into_contact_is_never_done(monkeypatch):
         assert "residual" in {item.id for item in trust if item.says == "against"}
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 @repeated_when_the_host_stalls
 def test_no_run_is_done_whose_recorder_was_lost_near_the_end(state, tmp_path, host, number):
     """Too late for F63, which waits for a second, or in time for it: never `done`, never exit 0."""

@@ -194,7 +194,7 @@ def test_a_driver_that_raises_in_mid_push_stops_it_and_the_log_says_so(push, sen
     assert push(sensors, "replay", "out").code == 0
 
 
-@pytest.mark.parametrize("kind", ["Uncounted", "WallClock"])
+@pytest.mark.parametrize("kind", ["Uncounted", pytest.param("WallClock", marks=pytest.mark.long)])
 def test_a_driver_that_counts_nothing_or_stamps_by_the_wall_clock_still_pushes(push, sensors, kind):
     done = push(
         sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--distance-m", "0.1", "--out", "out", "--json",
