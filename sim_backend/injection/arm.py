@@ -70,7 +70,7 @@ def _change(word: FaultWord) -> Callable[[ArmRecord, ArmRecord, float], ArmRecor
         position = change(now.joints.position, first.joints.position, value, since_s)
         velocity = now.joints.velocity
         if word.kind == "moving":
-            velocity = tuple(v + by for v, by in zip(velocity, value, strict=True))  # type: ignore[assignment]
+            velocity = tuple(v + by for v, by in zip(velocity, value, strict=True))  # type: ignore[assignment]  # six as before
         return replace(now, joints=replace(now.joints, position=position, velocity=velocity))
 
     return moved
