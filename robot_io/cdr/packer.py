@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, NoReturn
 
 Write = Callable[[Any, bytearray], None]
 Build = Callable[[list[Any]], Any]
+Flatten = Callable[[tuple[Any, ...]], list[Any]]
 
 
 class Packed(NamedTuple):
@@ -41,43 +42,67 @@ class Construction(NamedTuple):
     children: list[Any]
 
 
+class _Source:
+    """Lines that fetch the values of a message `m` and its parts, each part once."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._known: dict[str, str] = {"": "m"}
+
+    def value(self, path: str) -> str:
+        before, _, name = path.rpartition(".")
+        return f"{self._kept(before)}.{name}"
+
+    def numbers(self, items: list[tuple[str, int | None]]) -> str:
+        """Return the arguments that are the numbers of `items`; arrays of another length are refused."""
+        arguments = []
+        for path, length in items:
+            if length is None:
+                arguments.append(self.value(path))
+            else:
+                array = self._kept(path)
+                self.lines.append(f"if len({array}) != {length}: refuse({array}, {length})")
+                arguments.append(f"*{array}")
+        return ", ".join(arguments)
+
+    def _kept(self, path: str) -> str:
+        if path not in self._known:
+            text = self.value(path)
+            self._known[path] = f"v{len(self._known)}"
+            self.lines.append(f"{self._known[path]} = {text}")
+        return self._known[path]
+
+
 def writer_of(parts: list[Packed | WriterCall], header_bytes: int) -> Write:
     """Return `write(message, out)`, which appends the parts one after another; offsets count from `header_bytes` on.
 
     The paths must be attribute names. It raises ValueError for an array of another length.
     """
-    lines: list[str] = []
     names: dict[str, Any] = {"refuse": _refuse}
-    known: dict[str, str] = {"": "m"}
-
-    def value(path: str) -> str:
-        before, _, name = path.rpartition(".")
-        return f"{kept(before)}.{name}"
-
-    def kept(path: str) -> str:
-        if path not in known:
-            text = value(path)
-            known[path] = f"v{len(known)}"
-            lines.append(f"{known[path]} = {text}")
-        return known[path]
-
+    source = _Source()
     for i, part in enumerate(parts):
         if isinstance(part, WriterCall):
             names[f"write{i}"] = part.write
-            lines.append(f"write{i}({value(part.path)}, out)")
-            continue
-        names[f"packs{i}"] = part.packs
-        arguments = []
-        for path, length in part.items:
-            if length is None:
-                arguments.append(value(path))
-            else:
-                array = kept(path)
-                lines.append(f"if len({array}) != {length}: refuse({array}, {length})")
-                arguments.append(f"*{array}")
-        lines.append(f"out += packs{i}[(len(out) - {header_bytes}) & 7]({', '.join(arguments)})")
-    write: Write = _compiled("def made(m, out):\n    " + "\n    ".join(lines), names)
+            source.lines.append(f"write{i}({source.value(part.path)}, out)")
+        else:
+            names[f"packs{i}"] = part.packs
+            numbers = source.numbers(part.items)
+            source.lines.append(f"out += packs{i}[(len(out) - {header_bytes}) & 7]({numbers})")
+    write: Write = _compiled("def made(m, out):\n    " + "\n    ".join(source.lines), names)
     return write
+
+
+def flattener_of(items: list[tuple[str, int | None]]) -> Flatten:
+    """Return `flatten(messages)`: how many there are, and then the numbers of each; `items` as in `Packed`.
+
+    It raises ValueError for an array of another length.
+    """
+    source = _Source()
+    numbers = source.numbers(items)
+    body = "\n        ".join([*source.lines, f"found += ({numbers},)"])
+    text = f"def made(messages):\n    found = [len(messages)]\n    for m in messages:\n        {body}\n    return found"
+    flatten: Flatten = _compiled(text, {"refuse": _refuse})
+    return flatten
 
 
 def builder_of(tree: Construction | Slot) -> Build:
