@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from robot_io.errors import LogDamaged, UsageError
 from robot_io.log.format_1 import arm_state
 
-LOG_FORMAT = 2
+LOG_FORMAT = 3
 FORMAT_FACT = "format"
 """Where a log's metadata `run` says its format; the first one said nothing."""
 _FIRST_FORMAT = 1
@@ -48,6 +48,14 @@ class ComputedValue(NamedTuple):
     last_format: int
 
 
+class NowOptional(NamedTuple):
+    """Logs up to `last_format` always hold one message in `field` of `type_name`, today a sequence of at most one."""
+
+    type_name: str
+    field: str
+    last_format: int
+
+
 class ChangedTopic(NamedTuple):
     """Logs up to `last_format` derived the messages of `topic` in another way, so that they cannot be compared."""
 
@@ -58,6 +66,7 @@ class ChangedTopic(NamedTuple):
 RENAMED_FIELDS: tuple[RenamedField, ...] = ()
 EARLIER_VALUES: tuple[EarlierValue, ...] = ()
 COMPUTED_VALUES = (ComputedValue("push_msgs/msg/ArmRecord", "joints.state", arm_state, 1),)
+NOW_OPTIONAL = (NowOptional("push_msgs/msg/ControlTick", "before", 2),)
 CHANGED_TOPICS = (ChangedTopic("/diagnostics", 1), ChangedTopic("/safety/event", 1), ChangedTopic("/rosout", 1))
 
 

@@ -51,6 +51,10 @@ class LoggedType(Generic[MessageT]):
         """Return whether the log's messages are today's, byte for byte."""
         return self._logged is None
 
+    def holds_all_of(self, path: str) -> bool:
+        """Return whether the part at a dotted path has the same fields in the log as today."""
+        return not any(field.startswith(path) for field in self.missing | self.gone)
+
     def decode(self, payload: bytes) -> MessageT:
         """Return the message of a payload as today's. Raises LogDamaged when it is none of the log's own type."""
         if self._logged is None:
@@ -76,6 +80,7 @@ class _Maker:
 
     def __init__(self, log_format: int) -> None:
         self._format = log_format
+        self._now_optional = {(name, field) for name, field, last in table.NOW_OPTIONAL if log_format <= last}
         self.missing: set[str] = set()
         self.gone: set[str] = set()
 
@@ -89,6 +94,8 @@ class _Maker:
             here = f"{path}{name}"
             kept, its_shape = ours.pop(name.lower(), (name, None))
             convert = None if its_shape is None else self._shape(shape, its_shape, here)
+            if (today.ros_name, name) in self._now_optional and isinstance(shape, Many) and its_shape is not None:
+                convert = self._as_only_one(shape.element, its_shape, here)
             if convert is None:
                 self.missing.add(here)
                 if its_shape is not None:
@@ -128,6 +135,10 @@ class _Maker:
                 convert = self._shape(element, its_element, path)
                 return None if convert is None else lambda items: tuple(map(convert, items))
         return None
+
+    def _as_only_one(self, today: Shape, logged: Shape, path: str) -> Convert | None:
+        convert = self._shape(today, logged, path)
+        return None if convert is None else lambda value: (convert(value),)
 
     def _default(self, owner: Nested, name: str, shape: Shape) -> Any:
         for type_name, field, value, last_format in table.EARLIER_VALUES:

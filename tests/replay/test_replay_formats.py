@@ -24,7 +24,7 @@ PID, LATERAL = "int64 child_pid", "float64 lateral_m"
 @pytest.fixture(autouse=True)
 def only_the_tables_of_the_test(monkeypatch):
     """The older logs here are made of today's types, so that what really was otherwise in format 1 is not in them."""
-    for table in ("RENAMED_FIELDS", "EARLIER_VALUES", "COMPUTED_VALUES", "CHANGED_TOPICS"):
+    for table in ("RENAMED_FIELDS", "EARLIER_VALUES", "COMPUTED_VALUES", "NOW_OPTIONAL", "CHANGED_TOPICS"):
         monkeypatch.setattr(log_format, table, ())
 
 
