@@ -6,7 +6,7 @@ field, which was most of what encoding cost, in the loop and at level `sim`; bui
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, NoReturn
 
 Write = Callable[[Any, bytearray], None]
@@ -14,11 +14,24 @@ Build = Callable[[list[Any]], Any]
 Flatten = Callable[[tuple[Any, ...]], list[Any]]
 
 
-class Packed(NamedTuple):
-    """Neighbouring numbers: dotted path and array length (None: a scalar) of each; `packs` by offset modulo 8."""
+class Fixed(NamedTuple):
+    """Neighbouring numbers: dotted path and array length (None: a scalar) of each."""
 
     items: list[tuple[str, int | None]]
-    packs: list[Callable[..., bytes]]
+
+
+class Sequence(NamedTuple):
+    """A sequence of numbers, or of messages of nothing but numbers, which `flatten` turns into numbers."""
+
+    path: str
+    flatten: Flatten | None
+
+
+class Packed(NamedTuple):
+    """Numbers that one call packs; `packs` by offset modulo 8 and the number of elements of each sequence."""
+
+    parts: list[Fixed | Sequence]
+    packs: Mapping[tuple[int, ...], Callable[..., bytes]]
 
 
 class WriterCall(NamedTuple):
@@ -84,23 +97,33 @@ def writer_of(parts: list[Packed | WriterCall], header_bytes: int) -> Write:
         if isinstance(part, WriterCall):
             names[f"write{i}"] = part.write
             source.lines.append(f"write{i}({source.value(part.path)}, out)")
-        else:
-            names[f"packs{i}"] = part.packs
-            numbers = source.numbers(part.items)
-            source.lines.append(f"out += packs{i}[(len(out) - {header_bytes}) & 7]({numbers})")
+            continue
+        names[f"packs{i}"] = part.packs
+        arguments, counts = [], []
+        for n, numbers in enumerate(part.parts):
+            if isinstance(numbers, Fixed):
+                arguments.append(source.numbers(numbers.items))
+                continue
+            names[f"flatten{i}_{n}"] = numbers.flatten
+            flat = "{}" if numbers.flatten is None else f"flatten{i}_{n}({{}})"
+            source.lines.append(f"s{n} = {source.value(numbers.path)}")
+            counts.append(f"len(s{n})")
+            arguments.append(f"{counts[-1]}, *{flat.format(f's{n}')}")
+        key = ", ".join([f"(len(out) - {header_bytes}) & 7", *counts])
+        source.lines.append(f"out += packs{i}[{key},]({', '.join(arguments)})")
     write: Write = _compiled("def made(m, out):\n    " + "\n    ".join(source.lines), names)
     return write
 
 
 def flattener_of(items: list[tuple[str, int | None]]) -> Flatten:
-    """Return `flatten(messages)`: how many there are, and then the numbers of each; `items` as in `Packed`.
+    """Return `flatten(messages)`: the numbers of all of them; `items` as in `Fixed`.
 
     It raises ValueError for an array of another length.
     """
     source = _Source()
     numbers = source.numbers(items)
     body = "\n        ".join([*source.lines, f"found += ({numbers},)"])
-    text = f"def made(messages):\n    found = [len(messages)]\n    for m in messages:\n        {body}\n    return found"
+    text = f"def made(messages):\n    found = []\n    for m in messages:\n        {body}\n    return found"
     flatten: Flatten = _compiled(text, {"refuse": _refuse})
     return flatten
 

@@ -1,19 +1,19 @@
 """How the fields of a Struct are written as CDR and read back; used through `cdr.CdrType`.
 
-Neighbouring numbers, also across nested Structs, form a run that is packed by one `struct.Struct` call, with one
-format for each of the eight offsets at which the run may start. Fields of variable length are parts of their own; a
-sequence of numbers, or of Structs of nothing but numbers, is packed by one call as well.
+Neighbouring numbers, also across nested Structs, form a run that is unpacked by one `struct.Struct` call, with one
+format for each of the eight offsets at which the run may start. Fields of variable length are parts of their own. All
+that is nothing but numbers between two others is packed by one call, with a format for each set of lengths.
 Reading accepts only what writing would produce, padding included, and makes nothing larger than the payload.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Iterator
+from itertools import groupby
 from typing import Any
 
-from robot_io.cdr.packer import Build, Flatten, Packed, Write, WriterCall, flattener_of, writer_of
+from robot_io.cdr.packer import Build, Fixed, Packed, Sequence, Write, WriterCall, flattener_of, writer_of
 from robot_io.cdr.shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text, builder, leaves
 from robot_io.cdr.wire import (
     HEADER_BYTES,
@@ -30,6 +30,8 @@ from robot_io.cdr.wire import (
 )
 
 _COUNT = Scalar("uint32")
+_MOST_PACKS = 1000
+"""More combinations of lengths than a run's ticks have; beyond it those kept are made anew."""
 
 
 class Layout:
@@ -63,7 +65,7 @@ class Layout:
     def write(self, value: Any, out: bytearray) -> None:
         """Append `value` to `out`, which starts with the encapsulation header."""
         if self._write is None:
-            self._write = writer_of([part.writing() for part in self._parts], HEADER_BYTES)
+            self._write = writer_of(_joined(self._parts), HEADER_BYTES)
         self._write(value, out)
 
     def read(self, payload: bytes, at: int) -> tuple[Any, int]:
@@ -80,7 +82,7 @@ class _Run(Part):
     """Numbers and fixed arrays of numbers, packed in one call."""
 
     def __init__(self, items: list[Item]) -> None:
-        self._paths = [(path, count) for path, _, count in items]
+        self._items = items
         self._packers = [struct.Struct(format_of(items, start)) for start in range(8)]
         # Only these bytes can differ from what would be written again: padding, and bools.
         self._loose = [
@@ -88,8 +90,11 @@ class _Run(Part):
         ]
         self.min_bytes = sum(PRIMITIVES[scalar.ros][1] * (count or 1) for _, scalar, count in items)
 
-    def writing(self) -> Packed:
-        return Packed(self._paths, [packer.pack for packer in self._packers])
+    def writing(self) -> Fixed:
+        return Fixed([(path, count) for path, _, count in self._items])
+
+    def items(self, counts: Iterator[int]) -> list[Item]:
+        return self._items
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         offset = (at - HEADER_BYTES) & 7
@@ -146,15 +151,15 @@ class _Numbers(Part):
     def __init__(self, path: str, scalar: Scalar) -> None:
         self._path = path
         self._code, self._size = PRIMITIVES[scalar.ros]
+        self._scalar = scalar
         self._enum = scalar.enum
-        self._pack = _sequence_packs(lambda count: [("", scalar, count)])
 
-    def writing(self) -> WriterCall:
-        return WriterCall(self._path, self._write)
+    def writing(self) -> Sequence:
+        return Sequence(self._path, None)
 
-    def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
-        count = len(values)
-        out += self._pack(count, (len(out) - HEADER_BYTES) & 7)(count, *values)
+    def items(self, counts: Iterator[int]) -> list[Item]:
+        count = next(counts)
+        return [("", _COUNT, None), *([("", self._scalar, count)] if count else [])]
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         count, at = read_count(payload, at, self._size)
@@ -190,7 +195,7 @@ class _Items(Part):
             self._element_min = _Text.min_bytes
         self.min_bytes = 4 if count is None else count * self._element_min
 
-    def writing(self) -> WriterCall:
+    def writing(self) -> Sequence | WriterCall:
         return WriterCall(self._path, self._write)
 
     def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
@@ -217,16 +222,15 @@ class _Items(Part):
 class _Rows(_Items):
     """A sequence of Structs that hold nothing but numbers."""
 
-    def __init__(self, path: str, element: Nested, items: list[Item]) -> None:
+    def __init__(self, path: str, element: Nested, columns: list[Item]) -> None:
         super().__init__(path, element, None)
-        self._columns = [(column, count) for column, _, count in items]
-        self._pack = _sequence_packs(lambda count: items * count)
-        self._flatten: Flatten | None = None  # compiled at its first use, as a layout is
+        self._columns = columns
 
-    def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
-        if self._flatten is None:
-            self._flatten = flattener_of(self._columns)
-        out += self._pack(len(values), (len(out) - HEADER_BYTES) & 7)(*self._flatten(values))
+    def writing(self) -> Sequence:
+        return Sequence(self._path, flattener_of([(path, count) for path, _, count in self._columns]))
+
+    def items(self, counts: Iterator[int]) -> list[Item]:
+        return [("", _COUNT, None), *(self._columns * next(counts))]
 
 
 def _variable_part(path: str, leaf: Shape) -> Part:
@@ -237,8 +241,8 @@ def _variable_part(path: str, leaf: Shape) -> Part:
             return _Blob(path)
         case Many(Scalar() as element, None):
             return _Numbers(path, element)
-        case Many(Nested() as element, None) if (items := _fixed_items(element)) is not None:
-            return _Rows(path, element, items)
+        case Many(Nested() as element, None) if (columns := _fixed_items(element)) is not None:
+            return _Rows(path, element, columns)
         case Many((Nested() | Text(wide=False)) as element, count):
             return _Items(path, element, count)
     raise TypeError(f"{path}: {leaf!r} has no CDR form")
@@ -258,12 +262,31 @@ def _fixed_items(shape: Nested) -> list[Item] | None:
     return items
 
 
-def _sequence_packs(items_of: Callable[[int], list[Item]]) -> Callable[[int, int], Callable[..., bytes]]:
-    """Return what packs a count and then so many elements, by count and offset modulo 8."""
+class _Packs(dict[tuple[int, ...], Callable[..., bytes]]):
+    """What packs some neighbouring parts, by offset modulo 8 and the number of elements of each sequence."""
 
-    @lru_cache(maxsize=1000)  # windows of the tick's state: dozens of lengths at two offsets
-    def pack(count: int, start: int) -> Callable[..., bytes]:
-        items = items_of(count) if count else []
-        return struct.Struct(format_of([("", _COUNT, None), *items], start)).pack
+    def __init__(self, parts: list[Part]) -> None:
+        super().__init__()
+        self._parts = parts
 
-    return pack
+    def __missing__(self, key: tuple[int, ...]) -> Callable[..., bytes]:
+        if len(self) >= _MOST_PACKS:
+            self.clear()
+        start, *counts = key
+        left = iter(counts)
+        items = [item for part in self._parts for item in part.items(left)]
+        self[key] = struct.Struct(format_of(items, start)).pack
+        return self[key]
+
+
+def _joined(parts: list[Part]) -> list[Packed | WriterCall]:
+    """Return how the parts are written: neighbours that are nothing but numbers by one call."""
+    joined: list[Packed | WriterCall] = []
+    for is_numbers, group in groupby(parts, lambda part: isinstance(part, _Run | _Numbers | _Rows)):
+        together = list(group)
+        written = [part.writing() for part in together]
+        if is_numbers:
+            joined.append(Packed([one for one in written if not isinstance(one, WriterCall)], _Packs(together)))
+        else:
+            joined.extend(one for one in written if isinstance(one, WriterCall))
+    return joined

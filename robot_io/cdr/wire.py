@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import struct
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
-from robot_io.cdr.packer import Packed, WriterCall
+from robot_io.cdr.packer import Fixed, Sequence, WriterCall
 from robot_io.cdr.shape import PRIMITIVES, Scalar
 
 HEADER_BYTES = 4
@@ -29,8 +30,12 @@ class Part(ABC):
     min_bytes: int
 
     @abstractmethod
-    def writing(self) -> Packed | WriterCall:
+    def writing(self) -> Fixed | Sequence | WriterCall:
         """Return how it is written."""
+
+    def items(self, counts: Iterator[int]) -> list[Item]:
+        """Return the numbers of a fixed part, or of a sequence that has the next of `counts` elements."""
+        raise NotImplementedError
 
     @abstractmethod
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:

@@ -101,7 +101,7 @@ def _ahead(workspace: WorkspaceSettings, inp: TickInput, yaw: float, age_s: floa
 def _room_of_base(
     workspace: WorkspaceSettings, edge: Polygon, pose: Pose2D, shifts: list[_Shift], here: float
 ) -> float:
-    """Return the least room (m) of the base's outline there; `here`: what it has at least at its pose, however turned."""
+    """Return the least room (m) of the base's outline there; `here`: the least it has at its pose, however turned."""
     length, width = workspace.half_length, workspace.half_width
     far = here - max([math.hypot(dx, dy) for dx, dy, _ in shifts])
     if far > 0.0:  # in the middle of the floor, as nearly always
