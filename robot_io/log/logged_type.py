@@ -80,7 +80,9 @@ class _Maker:
 
     def __init__(self, log_format: int) -> None:
         self._format = log_format
-        self._now_optional = {(name, field) for name, field, last in table.NOW_OPTIONAL if log_format <= last}
+        self._now_optional = {
+            (name, field): counts for name, field, counts, last in table.NOW_OPTIONAL if log_format <= last
+        }
         self.missing: set[str] = set()
         self.gone: set[str] = set()
 
@@ -94,15 +96,16 @@ class _Maker:
             here = f"{path}{name}"
             kept, its_shape = ours.pop(name.lower(), (name, None))
             convert = None if its_shape is None else self._shape(shape, its_shape, here)
-            if (today.ros_name, name) in self._now_optional and isinstance(shape, Many) and its_shape is not None:
-                convert = self._as_only_one(shape.element, its_shape, here)
+            counts = self._now_optional.get((today.ros_name, name))
+            if counts is not None and isinstance(shape, Many) and its_shape is not None:
+                convert = self._shape(shape.element, its_shape, here)
             if convert is None:
                 self.missing.add(here)
                 if its_shape is not None:
                     self.gone.add(here)
                 values.append(_constant(self._default(today, name, shape)))
             else:
-                values.append(_field(kept, convert))
+                values.append(_field(kept, convert) if counts is None else _optional(kept, convert, counts))
         self.gone |= {f"{path}{name}" for name in ours}
         make = today.struct_type
         computed = [
@@ -135,10 +138,6 @@ class _Maker:
                 convert = self._shape(element, its_element, path)
                 return None if convert is None else lambda items: tuple(map(convert, items))
         return None
-
-    def _as_only_one(self, today: Shape, logged: Shape, path: str) -> Convert | None:
-        convert = self._shape(today, logged, path)
-        return None if convert is None else lambda value: (convert(value),)
 
     def _default(self, owner: Nested, name: str, shape: Shape) -> Any:
         for type_name, field, value, last_format in table.EARLIER_VALUES:
@@ -179,6 +178,10 @@ def _constant(value: Any) -> Convert:
 
 def _field(name: str, convert: Convert) -> Convert:
     return lambda message: convert(getattr(message, name))
+
+
+def _optional(name: str, convert: Convert, counts: Callable[[Any], bool]) -> Convert:
+    return lambda message: (convert(getattr(message, name)),) if counts(message) else ()
 
 
 def _as_it_is(value: Any) -> Any:
