@@ -91,10 +91,10 @@ def check(
         if motion.pose_run >= RUN and not _perhaps_stuck(state, inp):
             faults.append(Finding("F43" if _way_at_one_place(motion) > STILL_WAY_M else "F37", off))
     off = max((_of_command(mark, now, inp) for mark in motion.marks if not _near_by_command(mark, now)), default=0.0)
-    motion = replace(motion, command_run=motion.command_run + 1 if off > 1.0 else 0)
+    motion = replace(motion, command_run=motion.command_run + 1 if off > 1.0 else 0, marks=_kept(motion.marks, now))
     if motion.command_run >= RUN:
         faults.append(Finding("F33-way", off))
-    return replace(state, motion=replace(motion, marks=_kept(motion.marks, now))), faults
+    return replace(state, motion=motion), faults
 
 
 def _add_up(motion: MotionState, state: SafetyState, inp: TickInput) -> MotionState:

@@ -164,8 +164,10 @@ class TickReplayer:
             after, output = self._core.fold(before, tick.input)
             kept = (before,) if tick.before else ()
             replayed = ControlTick(tick.crc32_before, tick.reserved, tick.input, kept, after, output)
-            if self._logged.exact and TICK_CDR.encode(replayed) == payload:
+            encoded = TICK_CDR.encode(replayed)
+            if self._logged.exact and encoded == payload:
                 return None, after
+            replayed = TICK_CDR.decode(encoded)  # as a log holds it: a whole number where a float belongs is one
         except Exception as error:  # nothing in a log may crash its replay; the run itself survived this tick
             return Difference(number, "output", "a tick", f"{type(error).__name__}: {error}"), tick.after
         found = difference(number, tick, replayed, self._tolerance, self._logged.missing)
