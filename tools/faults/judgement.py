@@ -56,6 +56,8 @@ def judged(scenario: Scenario, found: LockstepRound) -> Proof:
     )
     if obeyed is None:
         return result(None, "no command was reduced")
+    if row.mode < Mode.STOP <= ticks[obeyed].mode:
+        return result(None, f"stopped by {', '.join(ticks[obeyed].faults)} before it could act")
     measured = obeyed - bad
     return result(measured, "" if measured <= row.bound_ticks else "too late")
 

@@ -54,6 +54,14 @@ def test_a_family_is_proved_in_lockstep(tmp_path):
         assert 0 < row["measured_ticks"] <= row["bound_ticks"] == bound
 
 
+@pytest.mark.long
+def test_every_row_is_proved(tmp_path):
+    done = push("faults", "--run", "--json", state=tmp_path)
+    failed = [row for row in json.loads(done.stdout.splitlines()[-1])["rows"] if not row["pass"]]
+    assert failed == []
+    assert done.returncode == 0
+
+
 def test_every_row_has_a_scenario():
     assert {scenario.row for scenario in SCENARIOS} == set(FAULTS)
 
@@ -104,6 +112,13 @@ def test_a_row_that_slows_needs_a_smaller_command_only():
     assert (proof.measured_ticks, proof.passed) == (0, True)
     proof = judged(Scenario("F50-slow", "by hand"), a_round(slow._replace(speed=0.1)))
     assert not proof.passed
+
+
+def test_a_row_that_slows_has_not_acted_where_another_stopped_the_base():
+    slow = Seen(3, 0.0, Mode.STOP, ("F55-slow", "F55-stop"), 0.0, True)
+    proof = judged(Scenario("F55-slow", "by hand"), a_round(slow))
+    assert not proof.passed
+    assert "stopped by F55-slow, F55-stop" in proof.why
 
 
 def test_a_warning_changes_no_mode_and_has_no_measure():
