@@ -54,7 +54,7 @@ TURN_NOISE_RAD_PER_SQRT_S = 0.012
 """Five times the noise of odometry's turn rate, added up as above."""
 
 COMMAND_FLOOR_M = 0.012
-COMMAND_TIMING_S = 0.35
+COMMAND_TIMING_S = 0.25
 """The base follows a command within 0.1 s; that it stands still is told sooner by F33."""
 TRACKING = 0.05
 """Wheels do what they are told, to this share."""
