@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from safety.faults import FAULTS
 from tools.faults import pairs
 from tools.faults.judgement import Proof, judged
 from tools.faults.lockstep_round import run_lockstep
 from tools.faults.scenarios import SCENARIOS
+from tools.faults.wire_proof import on_the_wire, prove_on_wire
 
 ALL_IDS: tuple[str, ...] = (*FAULTS, pairs.ID)
 
@@ -24,3 +26,5 @@ def prove(ids: Sequence[str]) -> Iterator[Proof]:
             yield Proof(row, "", "", None, FAULTS[row].bound_ticks, False, "there is no scenario for it")
         for scenario in scenarios:
             yield judged(scenario, run_lockstep(scenario))
+        for scenario in on_the_wire(row):
+            yield prove_on_wire(scenario, partial(judged, wire=True))
