@@ -47,7 +47,7 @@ class LockstepRound(NamedTuple):
     exit_code: int
 
 
-class _NoLog:
+class NoLog:
     """Keeps nothing."""
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
@@ -79,7 +79,7 @@ class FaultyLockstep(Lockstep):
     """A lockstep run under a scenario."""
 
     def __init__(self, rig: RigConfig, seed: int, scenario: Scenario, from_tick: int) -> None:
-        super().__init__(rig, seed, _NoLog(), saved=usual_tare(seed) if scenario.in_contact else None)
+        super().__init__(rig, seed, NoLog(), saved=usual_tare(seed) if scenario.in_contact else None)
         self.safety = self._core.safety
         self._core = _FaultyCore(self._core, scenario, from_tick)  # type: ignore[assignment]
         self._scenario = scenario
@@ -158,14 +158,14 @@ def reference(settings: tuple[str, ...], seed: int) -> tuple[Seen, ...]:
             Seen(state.control.phase, size(output.command_body), output.mode, output.faults, inp.base.pose.y, True)
         )
 
-    Lockstep(_rig(settings), seed, _NoLog()).run(on_tick)
+    Lockstep(_rig(settings), seed, NoLog()).run(on_tick)
     return tuple(ticks)
 
 
 @cache
 def usual_tare(seed: int) -> SavedTare:
     """Return the tare of a run without a fault."""
-    found = Lockstep(_rig(SETTINGS), seed, _NoLog()).run(lambda *_: None)
+    found = Lockstep(_rig(SETTINGS), seed, NoLog()).run(lambda *_: None)
     return SavedTare((*found["bias_force_N"], *found["bias_torque_Nm"]), tuple(found["held_joints_rad"]), "", 0.0)
 
 

@@ -10,9 +10,10 @@ from tools.faults import pairs
 from tools.faults.judgement import Proof, judged
 from tools.faults.lockstep_round import run_lockstep
 from tools.faults.scenarios import SCENARIOS
+from tools.faults.whole_runs import CHECKS, prove_whole_run
 from tools.faults.wire_proof import on_the_wire, prove_on_wire
 
-ALL_IDS: tuple[str, ...] = (*FAULTS, pairs.ID)
+ALL_IDS: tuple[str, ...] = (*FAULTS, *CHECKS, pairs.ID)
 
 
 def prove(ids: Sequence[str]) -> Iterator[Proof]:
@@ -20,6 +21,9 @@ def prove(ids: Sequence[str]) -> Iterator[Proof]:
     for row in ids:
         if row == pairs.ID:
             yield from pairs.prove_pairs()
+            continue
+        if row in CHECKS:
+            yield prove_whole_run(row)
             continue
         scenarios = [scenario for scenario in SCENARIOS if scenario.row == row]
         if not scenarios:

@@ -108,6 +108,7 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F01-stop", "silent", ("ft.off",)),
     Scenario("F02", "unplugged", ("ft.lost",)),
     Scenario("F04", "half of the packets", ("ft.crc=2",)),
+    Scenario("F04", "stray bytes in half of them", ("ft.junk=2",)),
     Scenario("F06", "one axis", ("ft.dead-axis=1",)),
     Scenario("F06", "frozen", ("ft.frozen",)),
     *(Scenario("F07", f"axis {axis} at its end", (f"ft.saturated={axis}",)) for axis in range(6)),

@@ -165,6 +165,13 @@ def test_a_damaged_packet_is_dropped_and_counted_as_the_driver_does():
     assert bench.sensor.health().counters == {"packets_ok": 98, "crc_fail": 5}
 
 
+def test_a_packet_torn_by_a_stray_byte_is_junk_and_no_candidate_of_it_passes():
+    bench = Bench("ft.junk=4 at 0 s")
+    assert [len(bench.felt(10 * k, 1.0)) for k in range(8)] == [1, 1, 1, 0, 1, 1, 1, 0]
+    counters = {"packets_ok": 98, "crc_fail": 5, "junk_bytes": 34, "resyncs": 2}  # twice 16 bytes and one more
+    assert bench.sensor.health().counters == counters
+
+
 def test_a_lost_link_stays_lost():
     bench = Bench("ft.lost at 0.01 s for 0.01 s")
     assert len(bench.felt(0, 1.0)) == 1

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
 from robot_io.tick import Mode
 from safety.faults import FAULTS
 from tests.replay.runs import PUSH, ROOT, push
-from tools.faults import wire_proof
+from tools.faults import whole_runs, wire_proof
 from tools.faults.judgement import Proof, judged
 from tools.faults.lockstep_round import LockstepRound, Seen
 from tools.faults.scenario import Scenario
@@ -75,6 +78,46 @@ def test_a_family_is_proved_on_the_wire_too_where_commands_may_come_two_ticks_la
     ]
     for row in rows:
         assert 0 < row["measured_ticks"] <= row["bound_ticks"]
+
+
+def test_rows_without_a_reaction_are_judged_by_a_check_of_their_own(tmp_path):
+    for only in ("F13", "F62"):
+        done = push("faults", "--run", "--only", only, "--json", state=tmp_path)
+        [row] = json.loads(done.stdout.splitlines()[-1])["rows"]
+        assert (row["id"], row["measured_ticks"], row["pass"]) == (only, None, True)
+
+
+def test_such_a_check_can_fail(monkeypatch):
+    monkeypatch.setattr(whole_runs, "LAG_S", 5.0)
+    proof = whole_runs.prove_whole_run("F13")
+    assert not proof.passed
+    assert "exit code" in proof.why
+
+    def stamped(self, tick, now_ns):
+        inp, output = usual(self, tick, now_ns)
+        self._log.record(0, time.time_ns(), b"")
+        return inp, output
+
+    usual = whole_runs.Lockstep._tick
+    monkeypatch.setattr(whole_runs.Lockstep, "_tick", stamped)
+    assert "differ" in whole_runs.prove_whole_run("F62").why
+
+
+def test_what_an_hour_keeps_is_noticed(monkeypatch):
+    quarter = {"loop": {"ticks": 90_000, "rate_hz": 100.0}}
+    monkeypatch.setattr(whole_runs, "_run", lambda _: quarter)
+    assert whole_runs.an_hour() == ""
+    with contextlib.ExitStack() as kept:
+
+        def leaking(_):
+            kept.enter_context(Path("/dev/null").open())
+            return quarter
+
+        monkeypatch.setattr(whole_runs, "_run", leaking)
+        assert whole_runs.an_hour() == "3 descriptors more are open"
+    monkeypatch.setattr(whole_runs, "_run", lambda _: quarter)
+    monkeypatch.setattr(whole_runs, "_kept", iter(((1000, 6), (3049, 6))).__next__)
+    assert whole_runs.an_hour() == "it has grown by 2049 kB"
 
 
 @pytest.mark.long
