@@ -1,33 +1,21 @@
 """Every row of the fault table: noticed in time, reacted to as it says, cleared only as it says; no row untested."""
 
-import ast
 import math
 
 import pytest
 from msgspec.structs import replace
 
-import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
-from safety import supervisor
-from safety.checks import (
-    agreement_checks,
-    arm_checks,
-    base_checks,
-    clock_checks,
-    force_checks,
-    host_checks,
-    link_checks,
-    motion_checks,
-    sensor_checks,
-    stuck_checks,
-    task_checks,
-    workspace_checks,
-)
+from safety.checks import task_checks
 from safety.faults import FAULTS, Clears, strongest
-from tests.mutants import load, tree_of
+from tests.mutants import tree_of
 from tests.safety.fault_scenarios import BY_THE_GATE, SCENARIOS, Scenario
 from tests.safety.fold_bench import FoldBench, pushing
+from tests.safety.removed_checks import CHECKS, install, naming, remove, without
+from tools.faults.judgement import judged
+from tools.faults.lockstep_round import run_lockstep
+from tools.faults.scenarios import SCENARIOS as PROVED
 
 ids = [str(s) for s in SCENARIOS]
 
@@ -162,57 +150,14 @@ def test_the_table_says_what_it_means():
 
 # --- the test of the tests: without its check, a row goes unnoticed -----------------------------------------------
 
-CHECKS = {
-    "safety.checks.force_checks": force_checks,
-    "safety.checks.sensor_checks": sensor_checks,
-    "safety.checks.stuck_checks": stuck_checks,
-    "safety.checks.arm_checks": arm_checks,
-    "safety.checks.base_checks": base_checks,
-    "safety.checks.host_checks": host_checks,
-    "safety.checks.link_checks": link_checks,
-    "safety.checks.clock_checks": clock_checks,
-    "safety.checks.task_checks": task_checks,
-    "safety.supervisor": supervisor,
-    "safety.checks.workspace_checks": workspace_checks,
-    "safety.checks.motion_checks": motion_checks,
-    "safety.checks.agreement_checks": agreement_checks,
-}
-
-
-def naming(tree: ast.Module, row: str) -> list[ast.If]:
-    """Return each `if` whose own body (not that of an `if` inside it) names the row."""
-
-    def names(node: ast.AST) -> bool:
-        if isinstance(node, ast.Constant) and node.value == row:
-            return True
-        if isinstance(node, ast.Name) and node.id == "_REFUSALS" and row in ("R02", "R03", "R02-dead", "R02-contact"):
-            return True
-        return any(names(child) for child in ast.iter_child_nodes(node) if not isinstance(child, ast.If))
-
-    found = []
-    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
-        found += [n for n in ast.walk(function) if isinstance(n, ast.If) and any(names(child) for child in n.body)]
-    return found
-
-
 PLACES = [
     (row, module, index) for row in FAULTS for module in CHECKS for index in range(len(naming(tree_of(module), row)))
 ]
 
 
-def without_check(row: str, module: str, index: int):
-    tree = tree_of(module)
-    naming(tree, row)[index].test = ast.Constant(False)
-    return load(module, tree)
-
-
 @pytest.mark.parametrize(("row", "module", "index"), PLACES, ids=[f"{r} in {m} {i}" for r, m, i in PLACES])
 def test_without_its_check_a_row_goes_unnoticed(row, module, index, monkeypatch):
-    blind = without_check(row, module, index)
-    if module == "safety.supervisor":
-        monkeypatch.setattr(tools.run.tick_core, "supervise", blind.supervise)
-    else:
-        monkeypatch.setattr(CHECKS[module], "check", blind.check)
+    install(without(row, module, index), module, monkeypatch)
     scenarios = [s for s in SCENARIOS if s.row == row]
     missed = []
     for scenario in scenarios:
@@ -224,9 +169,18 @@ def test_without_its_check_a_row_goes_unnoticed(row, module, index, monkeypatch)
 
 
 def test_every_row_has_a_check_to_remove():
-    by_give_up = {"F68"}  # raised by the fold itself, see the tests of the supervisor
+    by_give_up = {"F68"}  # raised by the fold itself
     rows = {row for row, _, _ in PLACES}
     assert set(FAULTS) - rows - set(BY_THE_GATE) - by_give_up == set()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", FAULTS)
+def test_without_its_checks_a_row_is_not_proved(row, monkeypatch):
+    """`push faults --run` notices, in each of the row's scenarios, although other rows may stop the base instead."""
+    remove(row, monkeypatch)
+    for scenario in (one for one in PROVED if one.row == row):
+        assert not judged(scenario, run_lockstep(scenario)).passed, scenario.what
 
 
 def test_one_jump_told_again_and_again_is_one_jump():

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from robot_io.messages import BodyTwist
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, Phase, TickInput, TickOutput, TickState
+from safety.gate import LATCH_FAULT
 from tools.faults.scenario import Moment, Scenario, at
 from tools.places.saved_tare import SavedTare
 from tools.rig import resolve_rig, with_faults
@@ -90,7 +91,10 @@ class FaultyLockstep(Lockstep):
         super()._finish_tick(inp, after, output)
         command = self._gate.record.sent if self._scenario.by_gate and inp.tick >= self._from else output.command_body
         begun = self._scenario.begins is None or self._scenario.begins(inp, after)
-        self.ticks.append(Seen(after.control.phase, size(command), output.mode, output.faults, inp.base.pose.y, begun))
+        faults = output.faults
+        if self._scenario.silent or self._scenario.dead:  # nobody but the gate is left to name it
+            faults = (LATCH_FAULT.get(self._gate.told, ""),)
+        self.ticks.append(Seen(after.control.phase, size(command), output.mode, faults, inp.base.pose.y, begun))
         if len(self.ticks) > MOST_TICKS:
             raise _TooLong
 
