@@ -23,8 +23,9 @@ the fault can be seen to the first reduced command.
 
 `push faults --run` brings every row about and measures the reaction; `--only F01` does so for one row or family.
 Each row is brought about at level sim, exact to the tick; those that a device alone can cause also at level emulated,
-with real drivers and processes: there the command that has arrived at the base counts, and may be two ticks later. A
-round in which this machine kept a process waiting and which failed is repeated, three times at most.
+with real drivers and processes: there the command that has arrived at the base counts (from the gate, where it is the
+base that does not obey), and may be two ticks later. A round in which this machine kept a process waiting and which
+failed is repeated, three times at most.
 With `--json`, `measured_ticks` is null where no command is to be reduced, and `pass` then says that the row did what
 it should. Beyond the rows of the table these are proved:
 

@@ -37,11 +37,9 @@ def level_of(*, wire: bool) -> str:
 def judged(scenario: Scenario, found: LockstepRound, *, wire: bool = False) -> Proof:
     """Return what a lockstep run, or one on the wire, showed of the scenario's row."""
     row = FAULTS[scenario.row]
-    bound = row.bound_ticks + (WIRE_TICKS if wire else 0)
+    bound = row.bound_ticks + (WIRE_TICKS if wire and row.mode > Mode.SILENT else 0)
     ticks = found.ticks
     named = next((i for i, seen in enumerate(ticks) if row.id in seen.faults), None)
-    if scenario.silent or scenario.dead:
-        named = found.first_bad
     bad = _first_bad(scenario, found)
 
     def result(measured: int | None, why: str) -> Proof:

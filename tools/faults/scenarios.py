@@ -142,6 +142,7 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F33", "stands still", ("base.command.ignored",), begins=off_by_half),
     Scenario("F33", "obeys another", ("base.command.wrong=0,0.08",), begins=off_by_half),
     Scenario("F33-way", "a quarter too slow", ("base.command.scaled=0.75",)),
+    Scenario("F33-way", "it is told twice a second only", ("base.command.slow=2",)),
     Scenario("F33-way", "15 degrees aside", ("base.command.turned=15",)),
     Scenario("F34", "drives on after a stop", ("base.command.frozen",), alter=do.operator_stop(5), begins=told_to_stop),
     Scenario("F35", "three times as fast", ("base.odometry.scaled=3",)),

@@ -36,7 +36,7 @@ def on_the_wire(row: str) -> Iterator[Scenario]:
 
 def _can_be_caused(scenario: Scenario) -> bool:
     by_facts = scenario.alter or scenario.core or scenario.gate or scenario.silent or scenario.dead
-    needs_more = scenario.begins or scenario.settings or scenario.edge_beside_m is not None
+    needs_more = scenario.settings or scenario.edge_beside_m is not None
     pushing = scenario.moment == Moment.PUSH and scenario.row not in NOTHING_ARRIVES
     return bool(scenario.words) and pushing and not by_facts and not needs_more
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import subprocess
 import tempfile
 import time
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from robot_io.ipc.process import fresh_interpreter
+from robot_io.log.channels import CHANNELS, Kind
 from robot_io.log.messages import INJECTED, SAFETY_EVENT
 from robot_io.log.world_messages import COMMAND_CDR
 from robot_io.mcap.log_file import RUN_METADATA
@@ -22,6 +24,7 @@ from tools.faults.scenario import Scenario, at
 from tools.log.derivation import TICK_TOPIC
 from tools.log.run_log import OFFSET_FACT
 
+SENT, ARRIVED, EVENTS = CHANNELS[Kind.GATE_SENT], CHANNELS[Kind.WORLD_COMMAND], CHANNELS[Kind.SAFETY_EVENT]
 PUSH = "import sys; from robot_io._entry import main; sys.exit(main())"
 SETTINGS = (
     "control.distance_m=1.0",
@@ -49,7 +52,7 @@ class Waited(NamedTuple):
 
 
 class WireRound(NamedTuple):
-    """What came of a round; `speed` of its ticks is that of the newest command that the base had received by then."""
+    """What came of a round; the `speed` of a tick is that of the newest command that had come to the base by then."""
 
     seen: LockstepRound
     bad_ns: int | None
@@ -80,7 +83,7 @@ def run_on_wire(scenario: Scenario) -> WireRound:
         argv += [part for setting in SETTINGS for part in ("--set", setting)]
         code, waited, said = _watched(argv, out, Path(folder) / "said")
         log = out / "run.mcap"
-        ticks, bad, bad_ns = _seen(log) if log.exists() else ([], None, None)
+        ticks, bad, bad_ns = _seen(log, scenario) if log.exists() else ([], None, None)
     return WireRound(LockstepRound(ticks, bad, code), bad_ns, waited, said)
 
 
@@ -133,36 +136,40 @@ def _longest_ms(waited: list[Waited], span_ns: int) -> float:
     return longest
 
 
-def _seen(log: Path) -> tuple[list[Seen], int | None, int | None]:
+def _seen(log: Path, scenario: Scenario) -> tuple[list[Seen], int | None, int | None]:
     """Return what the ticks came to, the first of them that could see the injected fault, and when that one began."""
     offset_ns = int(read_summary(log).metadata[RUN_METADATA][OFFSET_FACT])
+    # What arrives at a base that does not obey says nothing: then what the gate sent counts.
+    spoilt = any(word.startswith("base.command.") for word in scenario.words)
     ticks: list[ControlTick] = []
-    arrived: list[tuple[int, float]] = []
+    commands: list[tuple[int, float]] = []
     injected_ns: int | None = None
     for message in read_log(log):
+        at_ns = message.log_time_ns - offset_ns
         if message.topic == TICK_TOPIC:
             ticks.append(TICK_CDR.decode(message.payload))
-        elif message.topic == "/world/command":
+        elif message.topic == SENT.topic and spoilt:
+            twist = SENT.cdr_type.decode(message.payload).twist.linear
+            commands.append((at_ns, math.hypot(twist.x, twist.y)))
+        elif message.topic == ARRIVED.topic and not spoilt:
             command = COMMAND_CDR.decode(message.payload)
             if not command.is_switch:
-                arrived.append((command.arrival_ns, size(command.twist)))
-        elif message.topic == "/safety/event" and SAFETY_EVENT.decode(message.payload).kind == INJECTED:
-            at_ns = message.log_time_ns - offset_ns
+                commands.append((command.arrival_ns, size(command.twist)))
+        elif message.topic == EVENTS.topic and SAFETY_EVENT.decode(message.payload).kind == INJECTED:
             injected_ns = at_ns if injected_ns is None else min(at_ns, injected_ns)
     bad = _first_bad(ticks, injected_ns)
-    return _as_seen(ticks, sorted(arrived)), bad, None if bad is None else ticks[bad].input.now_ns
+    return _as_seen(ticks, sorted(commands), scenario), bad, None if bad is None else ticks[bad].input.now_ns
 
 
-def _as_seen(ticks: list[ControlTick], arrived: list[tuple[int, float]]) -> list[Seen]:
+def _as_seen(ticks: list[ControlTick], commands: list[tuple[int, float]], scenario: Scenario) -> list[Seen]:
     seen, at, speed = [], 0, 0.0
     for tick in ticks:
-        while at < len(arrived) and arrived[at][0] <= tick.input.now_ns:
-            speed = arrived[at][1]
+        inp, after, output = tick.input, tick.after, tick.output
+        while at < len(commands) and commands[at][0] <= inp.now_ns:
+            speed = commands[at][1]
             at += 1
-        output = tick.output
-        seen.append(
-            Seen(tick.after.control.phase, speed, output.mode, output.faults, tick.input.base.pose.y, begun=True)
-        )
+        begun = scenario.begins is None or scenario.begins(inp, after)
+        seen.append(Seen(after.control.phase, speed, output.mode, output.faults, inp.base.pose.y, begun))
     return seen
 
 
