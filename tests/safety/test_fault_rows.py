@@ -9,10 +9,9 @@ from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
 from safety.checks import task_checks
 from safety.faults import FAULTS, Clears, strongest
-from tests.mutants import tree_of
 from tests.safety.fault_scenarios import BY_THE_GATE, SCENARIOS, Scenario
 from tests.safety.fold_bench import FoldBench, pushing
-from tests.safety.removed_checks import CHECKS, install, naming, remove, without
+from tests.safety.removed_checks import install, places, remove, without
 from tools.faults.judgement import judged
 from tools.faults.lockstep_round import run_lockstep
 from tools.faults.scenarios import SCENARIOS as PROVED
@@ -150,9 +149,7 @@ def test_the_table_says_what_it_means():
 
 # --- the test of the tests: without its check, a row goes unnoticed -----------------------------------------------
 
-PLACES = [
-    (row, module, index) for row in FAULTS for module in CHECKS for index in range(len(naming(tree_of(module), row)))
-]
+PLACES = places()
 
 
 @pytest.mark.parametrize(("row", "module", "index"), PLACES, ids=[f"{r} in {m} {i}" for r, m, i in PLACES])
