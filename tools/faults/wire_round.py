@@ -81,20 +81,21 @@ def run_on_wire(scenario: Scenario) -> WireRound:
         argv = ["run", "emulated", "--no-report", "--json", "--out", str(out)]
         argv += [part for word in words for part in ("--fault", word)]
         argv += [part for setting in SETTINGS for part in ("--set", setting)]
-        code, waited, said = _watched(argv, out, Path(folder) / "said")
+        code, waited, said = _watched(argv, out, Path(folder))
         log = out / "run.mcap"
         ticks, bad, bad_ns = _seen(log, scenario) if log.exists() else ([], None, None)
     return WireRound(LockstepRound(ticks, bad, code), bad_ns, waited, said)
 
 
-def _watched(argv: list[str], out: Path, said: Path) -> tuple[int, list[Waited], str]:
+def _watched(argv: list[str], out: Path, folder: Path) -> tuple[int, list[Waited], str]:
     """Run `push` with `argv`; return its exit code, how its processes waited, and its last line on stderr."""
     waited: list[Waited] = []
+    said = folder / "said"
     [interpreter, own_path_only, *_], environment = fresh_interpreter("")
     with said.open("wb") as err:
         process = subprocess.Popen(
             [interpreter, own_path_only, "-c", PUSH, *argv],
-            env=environment,
+            env=environment | {"XDG_STATE_HOME": str(folder / "state")},  # the user's saved tares stay as they are
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=err,
