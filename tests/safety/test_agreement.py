@@ -201,6 +201,7 @@ def test_a_normal_push_meets_none_of_these(slip):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(600)
 def test_two_hundred_normal_pushes_meet_none_of_these():
     for seed in range(200):
         slip = 0.1 * (seed % 11) / 10

@@ -121,6 +121,7 @@ def test_what_an_hour_keeps_is_noticed(monkeypatch):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(1300)
 def test_every_row_is_proved_within_20_minutes(tmp_path):
     command, environment = [sys.executable, "-c", PUSH], os.environ | {"XDG_STATE_HOME": str(tmp_path)}
     done = subprocess.run(
