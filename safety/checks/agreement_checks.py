@@ -57,7 +57,7 @@ SURE = 0.999
 """Below this share of a floor no rounding of what follows makes a difference too large."""
 
 COMMAND_FLOOR_M = 0.012
-COMMAND_TIMING_S = 0.35
+COMMAND_TIMING_S = 0.25
 """The base follows a command within 0.1 s; that it stands still is told sooner by F33."""
 TRACKING = 0.05
 """Wheels do what they are told, to this share."""

@@ -15,7 +15,7 @@ from robot_io.tick import MotionMark, Phase
 from safety.checks import agreement_checks
 from tests.safety.fault_scenarios import base, shifted_pose, then
 from tests.safety.fold_bench import FoldBench, without_contact
-from tools.rig import resolve_rig
+from tools.rig import resolve_rig, with_faults
 from tools.run.lockstep import Lockstep
 
 FAST = ("control.push_speed_m_per_s=0.5", "control.distance_m=6")
@@ -138,6 +138,48 @@ def test_a_pose_counted_by_the_wheels_is_not_compared_with_them():
     assert ticks <= 300
 
 
+WAYS = {"0.75": (0.75, 0.0), "1.33": (1.33, 0.0), "left": (1.0, 15.0), "right": (1.0, -15.0)}
+
+
+def goes(share, degrees):
+    """Let the base go this share of what is sent, turned by so much, by odometry and pose alike."""
+    angle, gone = math.radians(degrees), [0.0, 0.0]
+
+    def alter(inp, _):
+        sent = inp.base.sent
+        x = share * (math.cos(angle) * sent.vx - math.sin(angle) * sent.vy)
+        y = share * (math.sin(angle) * sent.vx + math.cos(angle) * sent.vy)
+        gone[0] += (x - sent.vx) * 0.01
+        gone[1] += (y - sent.vy) * 0.01
+        inp = replace(inp, base=replace(inp.base, odometry=BodyTwist(x, y, 0.0)))
+        return shifted_pose(*gone)(inp, 0)
+
+    return alter
+
+
+@pytest.mark.parametrize("name", SPEEDS)
+@pytest.mark.parametrize("way", WAYS)
+def test_a_base_that_goes_another_way_than_sent_is_caught_within_30_centimetres_or_3_seconds(name, way):
+    bench, goes_on = moving(name)
+    alter = then(goes_on, goes(*WAYS[way])) if goes_on else goes(*WAYS[way])
+    way_m, time_s = 0.0, 0.0
+    while "F33-way" not in bench.output.faults:
+        assert not NAMES & set(bench.output.faults)
+        assert way_m <= 0.3 or time_s <= 3.0
+        way_m, time_s = way_m + math.hypot(bench.sent.vx, bench.sent.vy) * 0.01, time_s + 0.01
+        bench.fold(alter)
+    assert way_m <= 0.3 or time_s <= 3.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_quarter_too_slow_is_caught_within_3_seconds_in_spite_of_noise(seed):
+    rig = with_faults(resolve_rig("sim", ("control.distance_m=1.5",)), ("base.command.scaled=0.75 at 6 s",))
+    found = []
+    Lockstep(rig, seed, Nothing()).run(lambda inp, _state, output: found.append((inp.tick, output.faults)))
+    first = next(tick for tick, faults in found if "F33-way" in faults)
+    assert 600 < first <= 900
+
+
 class Nothing:
     """A log that keeps nothing."""
 
@@ -162,6 +204,7 @@ def test_a_normal_push_meets_none_of_these(slip):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(600)
 def test_two_hundred_normal_pushes_meet_none_of_these():
     for seed in range(200):
         slip = 0.1 * (seed % 11) / 10
