@@ -22,7 +22,9 @@ FLOATS = (
     *(math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, 1e-3, -1e-3, 0.1, -0.1, 0.5, -0.5, 1.0, -1.0, math.pi, 10.0),
     *(-10.0, 50.0, 160.0, -160.0, 300.0, -327.68, 1e6, -1e6, 1e17, 1.7e308, -1.7e308),
 )
-INTEGERS = (0, 1, -1, 2, 3, 5, 7, 20, 255, 256, 2**31 - 1, 2**31, -(2**31), 2**53, 2**62, 2**63 - 1, -(2**63))
+INTEGERS = (0, 1, -1, 2, 3, 5, 7, 20, 255, 256, 2**31 - 1, 2**31, -(2**31), 2**53, 2**62, -(2**62))
+MOST = 2**62
+"""More is reached by no counter, and by no clock in nanoseconds in a century."""
 OFFSETS_NS = (1, -1, 10**7, -(10**7), -5 * 10**7, -(10**8), -2 * 10**8, -(10**9), 10**9, -(10**10), 10**12)
 HOWS = ("value", "value", "frozen", "offset", "scaled")
 
@@ -121,7 +123,7 @@ def spoilt_value(kind: type, good: Any, frozen: Any, how: str, number: int) -> A
     if how == "value":
         return INTEGERS[number % len(INTEGERS)]
     wrong = good + OFFSETS_NS[number % len(OFFSETS_NS)] if how == "offset" else good * (number % 5 - 1)
-    return min(max(wrong, -(2**63)), 2**63 - 1)
+    return min(max(wrong, -MOST), MOST)
 
 
 def drawn_changes(draw: random.Random) -> list[Change]:

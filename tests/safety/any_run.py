@@ -13,8 +13,9 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from robot_io.ipc.gate_frame import GateFrame
+from robot_io.ipc.record import BASE_RECORD
 from robot_io.messages import BaseOdometry, BodyTwist, DeviceHealth, LinkState, Stamped
-from robot_io.tick import Phase, TickInput
+from robot_io.tick import TICK_CDR, Phase, TickInput
 from safety.gate import GateState
 from safety.gate_shell import GateShell
 from safety.motion_bounds import total_bounds
@@ -22,6 +23,7 @@ from safety.travel import MOVING_M_PER_S, Travel
 from tests.safety.any_input import FLOATS, TICKS, Change, Spoiler, drawn_changes
 from tests.safety.fold_bench import PERIOD_NS, FoldBench
 from tests.safety.fold_rules import GATE_MARGIN, ZERO, Rules, inside
+from tools.run.tick_core import tick_message
 
 MS = 1_000_000
 STARTS = ("first tick", "tare", "approach", "push", "lost", "retreat", "near its end")
@@ -122,13 +124,15 @@ class _Gate:
         self.way_m += speed * step_s if speed > MOVING_M_PER_S else 0.0
         self._now_ns = now_ns
         shell = before.on_frames(_frames(frame, wrongs), now_ns, now_ns)
-        odometry = bench.inp.base.odometry if bench.inp is not None else ZERO
+        odometry, stamp_s = bench.inp.base.odometry if bench.inp is not None else ZERO, now_ns * 1e-9
         for wrong in wrongs:
             if wrong.what == "odometry":
                 odometry = BodyTwist(FLOATS[wrong.number % len(FLOATS)], 0.0, 0.0)
+            if wrong.what == "stamp":
+                stamp_s = abs(FLOATS[wrong.number % len(FLOATS)])
             if wrong.what == "eof":
                 shell = shell.on_control_gone(now_ns)
-        shell = shell.on_samples([Stamped(BaseOdometry(odometry), 0, now_ns)])
+        shell = shell.on_samples([Stamped(BaseOdometry(odometry), 0, now_ns, stamp_s)])
         whats = {wrong.what for wrong in wrongs}
         shell = shell.on_clock(now_ns, LOST if "link" in whats else UP).on_asleep(10**9 if "asleep" in whats else 0)
         shell, _ = shell.on_leaving(now_ns)
@@ -145,6 +149,7 @@ class _Gate:
         assert over_m <= self._limits.speed * BASE_TIMEOUT_S, "further than this push can need"
         assert over_m < 1e-6 or shell.gate.latch, "it goes on beyond what this push can need"
         self.shell = shell.on_publish(now_ns, newest_inbound_ns=now_ns, newest_pong_ns=now_ns)
+        BASE_RECORD.encode(self.shell.record)
 
 
 def _frames(frame: GateFrame, wrongs: list[Wrong]) -> list[GateFrame | None]:
@@ -185,7 +190,10 @@ def run(sequence: Sequence, ticks: int = TICKS) -> int:
             base = replace(inp.base, latched=latched, latch_cause=cause)
             return spoiler.spoil(replace(inp, base=base), n)
 
-        output = bench.fold(seen)
+        before = bench.state
+        output = bench.fold(seen, n)
+        assert bench.inp is not None
+        TICK_CDR.encode(tick_message(bench.inp, before, bench.state, output))  # as the loop does, in the same tick
         rules.check(bench.state, output, now_ns)
         frame = GateFrame(gate.shell.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
         gate.turn(bench, frame, [wrong for wrong in sequence.wrongs if wrong.at == n])

@@ -18,6 +18,9 @@ from robot_io.tick import TickInput, TickOutput, TickState
 from safety.checks.motion_checks import GROUPS, PUSH
 from safety.motion_bounds import phase_bounds, total_bounds
 from tools.run.lockstep import Lockstep
+from tools.verdict.evidence import gather
+from tools.verdict.judgement import judge
+from tools.verdict.witness import Witness
 
 OBJECTS = {
     "box": (),
@@ -61,9 +64,10 @@ class _Way:
     def __init__(self, push: Lockstep) -> None:
         self._push = push
         self._last: tuple[float, float] | None = None
-        self.way_m = self.counted_m = 0.0
+        self.way_m = self.counted_m = self.travelled_m = 0.0
 
     def __call__(self, inp: TickInput, state: TickState, output: TickOutput) -> None:
+        self.travelled_m = inp.base.travel_m
         if GROUPS.get(state.control.phase) != PUSH:
             self._last = None
             return
@@ -107,16 +111,15 @@ def push_of(seed: int) -> Push:
         f"patches {rig.world.floor.patch_strength:.2f}, lateral {start.lateral_offset_m:+.3f} m, "
         f"edge {start.edge_offset_m:+.3f} m, heading {start.heading_deg:+.1f} degrees"
     )
-    travelled = push._gate.travel.distance_m / total_bounds(rig).distance_m
     return Push(
         seed,
         what,
-        ended["exit_code"],
+        judge(ended["exit_code"], gather(rig, ended, Witness())).exit_code,
         ended["fault_counts"],
         ended["worst_lateral_m"] or math.nan,
         way.way_m / ended["distance_m"] if ended["distance_m"] else math.nan,
         way.counted_m / phase_bounds(rig).push_m,
-        travelled,
+        way.travelled_m / total_bounds(rig).distance_m,
     )
 
 

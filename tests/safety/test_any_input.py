@@ -18,6 +18,8 @@ from tests.safety.any_input import HOWS, TICKS, Change, places
 from tests.safety.any_run import FRAME_WRONGS, STARTS, Sequence, Wrong, drawn_sequence, run
 
 CHUNK = 250
+MOST_BEGIN = 900
+"""A push of 0.3 m has about as many ticks."""
 MOST_TICKS = 40_000
 """A push of the shipped rig is bounded at 258 s in motion; with its rests it has ended long before this."""
 
@@ -34,11 +36,17 @@ def sequences(seed: int, first: int, count: int) -> int:
 
 
 def whole_push(seed: int, number: int) -> int:
-    """Run one push from its first tick to its end with a few places wrong from some tick on, for good."""
+    """Run one push from its first tick to its end, a few places wrong from some tick on, for a while or for ever."""
     draw = random.Random(f"{seed}/{number}")
     changes = [
-        Change(draw.randrange(len(places())), draw.choice(HOWS), draw.randrange(1000), draw.randrange(2800), 10**6)
-        for _ in range(draw.choice((1, 1, 2)))
+        Change(
+            draw.randrange(len(places())),
+            draw.choice(HOWS),
+            draw.randrange(1000),
+            draw.randrange(MOST_BEGIN),
+            draw.choice((1, 6, 15, 100, MOST_TICKS)),
+        )
+        for _ in range(draw.choice((1, 1, 2, 4)))
     ]
     try:
         ticks = run(Sequence("first tick", changes, [], {}), MOST_TICKS)
