@@ -24,7 +24,7 @@ from robot_io.mcap.read import read_log
 from robot_io.tick import TICK_CDR, Phase
 from tests.faults.kill_rounds import STALL_MS
 from tests.host_watch import HostWatch
-from tests.push_runs import PUSH, ROOT, Ended, Run, stands, started, world_of
+from tests.push_runs import PUSH, ROOT, Ended, Run, blame_the_host, stands, started, world_of
 
 NAMES = ("control", "gate", "arm", "recorder", "emulators", "launcher")
 KILL, STOP, SEGV = signal.SIGKILL, signal.SIGSTOP, signal.SIGSEGV
@@ -42,7 +42,8 @@ LONG_PHASES = (
 )
 ENDS_WITHIN_S = 45.0
 """A device that never answers is given up after 20 s, and so is each of those behind it."""
-GONE_WITHIN_S = 5.0
+GONE_WITHIN_S, RECORDER_S = 5.0, 5.0
+"""Nobody is left this long after rest, and the recorder may finish its file first."""
 WAY_M = {
     ("control", KILL): 0.008, ("control", SEGV): 0.008, ("control", STOP): 0.013,
     ("launcher", KILL): 0.008, ("launcher", SEGV): 0.008, ("launcher", STOP): 0.075,
@@ -76,6 +77,8 @@ class Found(NamedTuple):
     zero_ms: float | None
     rest_ms: float | None
     way_m: float | None
+    gone_s: float
+    """When nobody was left but who was frozen."""
     stall_ms: float
 
 
@@ -97,16 +100,21 @@ def play(state: Path, folder: Path, blow: Blow, host: HostWatch) -> Found:
     """Play a round and check what must always hold. Raises HostStalled where the host ended the run before the blow."""
     settings = [word for setting in LONG_PHASES for word in ("--set", setting)]
     argv = ("run", "emulated", "--distance-m", "0.3", "--no-report", *settings, "--out", str(folder), "--json")
-    with started(state, *argv, host=host) as run:
+    began_ns = time.monotonic_ns()
+    with started(state, *argv) as run:
         if PHASES[blow.phase]:
-            run.wait_for(PHASES[blow.phase])
+            try:
+                run.wait_for(PHASES[blow.phase])
+            except AssertionError:
+                blame_the_host(host, began_ns, run.process.poll() or 0, run.err)
+                raise
         time.sleep(blow.later_s)
         pids = _pids(run, folder)
         at_ns = time.monotonic_ns()
         struck = [pids[who] for who in blow.who if who in pids and _sent(pids[who], blow.number)]
         time.sleep(0.5)
         stall_ms = max(host.worst_ms(at_ns, time.monotonic_ns()), host.worst_wait_ms(at_ns, time.monotonic_ns()))
-        ended = _ended(run, blow, struck)
+        ended, gone_ns = _ended(run, blow, struck)
         run.wait_gone(GONE_WITHIN_S)
     assert "Traceback" not in ended.err, ended.err
     log = _whole_log(folder)
@@ -116,7 +124,9 @@ def play(state: Path, folder: Path, blow: Blow, host: HostWatch) -> Found:
     summary = _summary(folder)
     assert summary.get("exit_code", ended.code) == ended.code or ended.code < 0
     zero_ms, rest_ms, way_m, phase = (None, None, None, "") if log is None else _seen(log, at_ns)
-    return Found(blow, ended.code, summary.get("verdict", ""), phase, zero_ms, rest_ms, way_m, stall_ms)
+    return Found(
+        blow, ended.code, summary.get("verdict", ""), phase, zero_ms, rest_ms, way_m, (gone_ns - at_ns) / 1e9, stall_ms
+    )
 
 
 def _sent(pid: int, number: int) -> bool:
@@ -139,7 +149,7 @@ def _pids(run: Run, folder: Path) -> dict[str, int]:
     return {"launcher": run.process.pid, **found}
 
 
-def _ended(run: Run, blow: Blow, struck: list[int]) -> Ended:
+def _ended(run: Run, blow: Blow, struck: list[int]) -> tuple[Ended, int]:
     """Wait for the end of the run; whoever was frozen wakes when only frozen ones are left, or after its time."""
     frozen = struck if blow.number == STOP else []
     deadline_s = time.monotonic() + ENDS_WITHIN_S
@@ -149,9 +159,10 @@ def _ended(run: Run, blow: Blow, struck: list[int]) -> Ended:
         while set(run.alive()) - set(frozen):
             assert time.monotonic() < deadline_s, f"left after {ENDS_WITHIN_S} s: {run.alive()}"
             time.sleep(0.05)
+    gone_ns = time.monotonic_ns()
     for pid in frozen:
         _sent(pid, signal.SIGCONT)
-    return run.wait(ENDS_WITHIN_S)
+    return run.wait(ENDS_WITHIN_S), gone_ns
 
 
 def _whole_log(folder: Path) -> Path | None:
@@ -200,13 +211,15 @@ def _seen(log: Path, at_ns: int) -> tuple[float | None, float | None, float | No
     return None if zero is None else (zero - at_ns) / 1e6, (rest - at_ns) / 1e6, way_m, phase
 
 
-def check_way(found: Found) -> None:
-    """Check how far the base went on, where the host kept still and the log can tell."""
+def check_bounds(found: Found) -> None:
+    """Check how far the base went on and when all was over, where the host kept still and the log can tell."""
     blow = found.blow
-    bound_m = WAY_M.get((blow.name, blow.number))
-    if bound_m is None or found.way_m is None or found.stall_ms > STALL_MS:
+    if found.stall_ms > STALL_MS or found.rest_ms is None or found.way_m is None or blow.name == "all":
         return
-    assert found.way_m <= bound_m, f"{in_words(found)}: more than {bound_m} m"
+    bound_m = WAY_M.get((blow.name, blow.number))
+    assert bound_m is None or found.way_m <= bound_m, f"{in_words(found)}: more than {bound_m} m"
+    after_s = GONE_WITHIN_S + (RECORDER_S if blow.name == "recorder" else 0.0)
+    assert found.gone_s <= found.rest_ms / 1e3 + after_s, f"{in_words(found)}: later than {after_s} s after rest"
 
 
 def in_words(found: Found) -> str:
@@ -219,7 +232,7 @@ def in_words(found: Found) -> str:
     way = "unseen" if found.way_m is None else f"{found.way_m * 1e3:.0f} mm"
     return (
         f"{blow.number.name} of {blow.name} in {blow.phase} ({found.phase}): code {found.code} {found.verdict!r}, "
-        f"{times}, way {way}, host held back {found.stall_ms:.0f} ms"
+        f"{times}, way {way}, all gone {found.gone_s:.1f} s, host held back {found.stall_ms:.0f} ms"
     )
 
 
@@ -227,7 +240,7 @@ def worst(found: list[Found]) -> str:
     """Return the worst of the rounds in which the host kept still."""
     quiet = [one for one in found if one.stall_ms <= STALL_MS]
     lines = [f"{len(found)} rounds, {len(quiet)} of them on a quiet host"]
-    for name, value in (("time to zero", "zero_ms"), ("time to rest", "rest_ms"), ("way", "way_m")):
+    for name, value in (("time to zero", "zero_ms"), ("time to rest", "rest_ms"), ("way", "way_m"), ("end", "gone_s")):
         seen = [one for one in quiet if getattr(one, value) is not None]
         if seen:
             lines.append(f"worst {name}: {in_words(max(seen, key=lambda one: getattr(one, value)))}")

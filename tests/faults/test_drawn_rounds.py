@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.faults.drawn_rounds import Found, check_way, drawn_blow, in_words, play, worst
+from tests.faults.drawn_rounds import Found, check_bounds, drawn_blow, in_words, play, worst
 from tests.host_watch import UNMEASURED, HostStalled
 from tests.how_many import how_many
 
@@ -28,7 +28,7 @@ def test_whoever_is_killed_or_frozen_whenever_the_base_stands_and_nothing_stays(
         except AssertionError as error:
             raise AssertionError(f"round {seed}/{number}, {blow}: {error}") from error
         print(f"round {seed}/{number}: {in_words(found[-1])}")
-        check_way(found[-1])
+        check_bounds(found[-1])
     print(worst(found))
     if spoilt:
         UNMEASURED.add(f"{spoilt} of {ROUNDS} rounds: the host ended the run before the blow")
