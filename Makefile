@@ -5,6 +5,9 @@ BIN := .venv/bin
 SEED ?= $(shell date +%s)
 DEMO := runs/demo-$(shell date +%Y%m%d-%H%M%S)
 
+# Tests start hundreds of processes: each would compile the whole program again where this is set.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-all check mutants clean runtime dev
 

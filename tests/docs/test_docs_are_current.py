@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from tests.host_watch import HostWatch, repeated_when_the_host_stalls
-from tests.push_runs import blame_the_host
+from tests.push_runs import QUICK, blame_the_host
 from tools.cli import COMMANDS
 from tools.dev.drivers_page import page
 from tools.dev.fault_table import page as faults_page
@@ -86,9 +86,13 @@ def readme_commands():
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.parametrize("shortened", [True, pytest.param(False, marks=pytest.mark.long)])
 @repeated_when_the_host_stalls
-def test_readme_shell_blocks_run(tmp_path):
-    """Every command of the README in order, in an empty folder; make targets are looked up, not run again."""
+def test_readme_shell_blocks_run(tmp_path, shortened):
+    """Every command of the README in order, in an empty folder; make targets are looked up, not run again.
+
+    shortened: whether pushes with the wall clock get a quick approach and tare, and end after 10 cm.
+    """
     environment = os.environ | {
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
         "XDG_STATE_HOME": str(tmp_path / "state"),
@@ -100,6 +104,8 @@ def test_readme_shell_blocks_run(tmp_path):
             if command.startswith("make "):
                 subprocess.run(["make", "-n", *shlex.split(command)[1:]], cwd=ROOT, check=True, capture_output=True)
                 continue
+            if shortened and re.match(r"push run (?!sim|thing)", command):
+                command = shlex.join([*re.sub(r"--distance-m \S+", "--distance-m 0.1", command).split(), *QUICK])
             began_ns = time.monotonic_ns()
             done = subprocess.run(
                 ["bash", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=80,

@@ -224,6 +224,7 @@ def test_all_devices_gone_at_once(state, tmp_path, host):
     assert [note for note in found.ended.last_object["notes"] if "emulators" in note]
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_nobody_but_control_ends_the_gate_and_the_recorder(state, tmp_path, host):
     """Whoever signals all processes of a run would cut the base's last zeros, and the log."""
@@ -254,6 +255,7 @@ if "tools.run.control_process" in sys.orig_argv:
 """
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_an_exception_in_the_loop(state, tmp_path, host):
     (tmp_path / "sitecustomize.py").write_text(BROKEN_FOLD)
@@ -292,6 +294,7 @@ if "tools.run.control_process" in sys.orig_argv:
 """
 
 
+@pytest.mark.long
 def test_control_frozen_before_its_first_tick(state, tmp_path):
     """The gate has heard nothing yet that could fall silent; the run ends all the same, and says why."""
     (tmp_path / "sitecustomize.py").write_text(FROZEN_BEFORE_ITS_FIRST_TICK)

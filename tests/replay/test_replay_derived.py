@@ -25,6 +25,8 @@ TOPICS = (
     "/ft/wrench_raw", "/ft/wrench", "/arm/joint_states", "/base/cmd_vel_raw", "/base/cmd_vel", "/loop/timing",
     "/diagnostics", "/tf", "/tf_static", "/robot_description", "/path", "/safety/event", "/rosout",
 )  # fmt: skip
+QUICKLY = ("/ft/wrench", "/tf", "/safety/event")
+SOME_TOPICS = [t if t in QUICKLY else pytest.param(t, marks=pytest.mark.long) for t in TOPICS]
 
 
 def first_of(log: Path, capsys) -> tuple[int, dict]:
@@ -67,7 +69,7 @@ def test_every_wrench_set_to_zero_is_found(sim_log, tmp_path, capsys):
     assert "first difference: message at 1" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("topic", TOPICS)
+@pytest.mark.parametrize("topic", SOME_TOPICS)
 def test_a_lost_and_a_doubled_message_are_found(topic, sim_log, tmp_path, capsys):
     def lost(messages: Messages) -> Messages:
         at = places(messages, topic)[-1]

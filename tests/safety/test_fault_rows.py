@@ -179,30 +179,40 @@ CHECKS = {
 }
 
 
-def naming(tree: ast.Module, row: str) -> list[ast.If]:
-    """Return each `if` whose own body (not that of an `if` inside it) names the row."""
+_REFUSED_BY_NAME = {"R02", "R03", "R02-dead", "R02-contact"}
 
-    def names(node: ast.AST) -> bool:
-        if isinstance(node, ast.Constant) and node.value == row:
-            return True
-        if isinstance(node, ast.Name) and node.id == "_REFUSALS" and row in ("R02", "R03", "R02-dead", "R02-contact"):
-            return True
-        return any(names(child) for child in ast.iter_child_nodes(node) if not isinstance(child, ast.If))
 
-    found = []
+def rows_named(node: ast.AST) -> set[str]:
+    """Return the rows that a node names, but not those that an `if` inside it names."""
+    if isinstance(node, ast.Constant) and node.value in FAULTS:
+        return {node.value}
+    if isinstance(node, ast.Name) and node.id == "_REFUSALS":
+        return _REFUSED_BY_NAME
+    return {row for child in ast.iter_child_nodes(node) if not isinstance(child, ast.If) for row in rows_named(child)}
+
+
+def naming(tree: ast.Module) -> dict[str, list[ast.If]]:
+    """Return each row's `if`s: those whose own body (not that of an `if` inside it) names the row."""
+    found: dict[str, list[ast.If]] = {row: [] for row in FAULTS}
     for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
-        found += [n for n in ast.walk(function) if isinstance(n, ast.If) and any(names(child) for child in n.body)]
+        for one in (n for n in ast.walk(function) if isinstance(n, ast.If)):
+            for row in set().union(*map(rows_named, one.body)):
+                found[row].append(one)
     return found
 
 
-PLACES = [
-    (row, module, index) for row in FAULTS for module in CHECKS for index in range(len(naming(tree_of(module), row)))
-]
+def places() -> list[tuple[str, str, int]]:
+    """Return row, module and number of every `if` that decides over a row."""
+    ifs = {module: naming(tree_of(module)) for module in CHECKS}
+    return [(row, module, index) for row in FAULTS for module in CHECKS for index in range(len(ifs[module][row]))]
+
+
+PLACES = places()
 
 
 def without_check(row: str, module: str, index: int):
     tree = tree_of(module)
-    naming(tree, row)[index].test = ast.Constant(False)
+    naming(tree)[row][index].test = ast.Constant(False)
     return load(module, tree)
 
 

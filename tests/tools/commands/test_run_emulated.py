@@ -244,6 +244,7 @@ def test_ctrl_c_while_starting_leaves_nothing(state, tmp_path, moment):
     assert not out.exists()
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_a_barrel_is_pushed_with_stdin_closed(state, tmp_path, host):
     argv = ("run", "barrel", "--distance-m", "0.15", *QUICK, "--out", str(tmp_path / "run"), "--json")
@@ -322,7 +323,9 @@ def test_a_closed_terminal_is_a_clean_stop(state, tmp_path, host):
     assert (summary["verdict"], summary["faults"], summary["notes"]) == ("operator stop", ["F64"], [])
 
 
-@pytest.mark.parametrize("key", [b"\x1a", b"\x1c"], ids=["Ctrl-Z", "Ctrl-backslash"])
+@pytest.mark.parametrize(
+    "key", [pytest.param(b"\x1a", id="Ctrl-Z"), pytest.param(b"\x1c", id="Ctrl-backslash", marks=pytest.mark.long)]
+)
 @repeated_when_the_host_stalls
 def test_keys_that_a_terminal_makes_signals_of_stop_like_any_other(state, tmp_path, host, key):
     """A launcher put to sleep would hear no key, and the base would push on; the other processes hear none of it."""

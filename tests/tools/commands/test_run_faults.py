@@ -74,12 +74,13 @@ def test_no_fault_is_injected_where_a_device_is_real(tmp_path):
     assert "base is at level hardware" in error["what"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "fault"),
     [
         (FROZEN, "F06"),
-        pytest.param("base.pose.off at 5 s", "F40-stop", marks=pytest.mark.long),
-        pytest.param("arm.protective-stop at 5 s", "F22", marks=pytest.mark.long),
+        ("base.pose.off at 5 s", "F40-stop"),
+        ("arm.protective-stop at 5 s", "F22"),
     ],
 )
 @repeated_when_the_host_stalls

@@ -55,7 +55,8 @@ def test_a_run_of_another_rig_goes_on(state, tmp_path, host):
         run.wait(10.0)
 
 
-@pytest.mark.parametrize("frozen", ["launcher", pytest.param("control", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("frozen", ["launcher", "control"])
 @repeated_when_the_host_stalls
 def test_a_frozen_process_does_not_keep_it_from_stopping(state, tmp_path, host, frozen):
     with started(state, *emulated(tmp_path / "run"), host=host) as run:
@@ -86,6 +87,7 @@ def test_a_base_without_a_run_is_sent_zeros_and_its_address_is_said(state):
     assert {entry[1:] for entry in heard} == {(0.0, 0.0, 0.0)}
 
 
+@pytest.mark.long
 def test_a_base_that_moves_on_is_not_called_at_rest(state):
     with running_bridge() as bridge:
         bridge.do("joystick", BodyTwist(0.1, 0.0, 0.0), 30.0)

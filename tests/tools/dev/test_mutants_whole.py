@@ -125,6 +125,7 @@ def test_it_names_survivors_and_after_a_new_test_tries_only_these_again(project)
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.long
 def test_interrupted_it_goes_on_where_it_was(project):
     (project / "control/law.py").write_text(LAW.partition("def count")[0])
     (project / "tests/control/test_law.py").write_text(TEST.replace(", count", "").partition("def test_count")[0])
@@ -164,6 +165,7 @@ def test():
 """
 
 
+@pytest.mark.long
 def test_a_session_that_never_ends_is_killed_with_what_it_started(tmp_path):
     (tmp_path / "test_endless.py").write_text(ENDLESS_TEST)
     (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n")

@@ -50,6 +50,7 @@ def test_a_push_with_an_arm_or_base_of_ones_own_replays(push, folder, device):
     assert push(folder, "replay", "out").code == 0
 
 
+@pytest.mark.long
 def test_an_arm_that_says_it_may_be_moved_stops_the_push(push, folder):
     done = push(
         folder, "run", "emulated", "--set", "arm.kind=own_devices:Arm", "--set", "arm.options.free_after=300",
@@ -194,7 +195,8 @@ def test_a_driver_that_raises_in_mid_push_stops_it_and_the_log_says_so(push, sen
     assert push(sensors, "replay", "out").code == 0
 
 
-@pytest.mark.parametrize("kind", ["Uncounted", pytest.param("WallClock", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["Uncounted", "WallClock"])
 def test_a_driver_that_counts_nothing_or_stamps_by_the_wall_clock_still_pushes(push, sensors, kind):
     done = push(
         sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--distance-m", "0.1", "--out", "out", "--json",
@@ -204,6 +206,7 @@ def test_a_driver_that_counts_nothing_or_stamps_by_the_wall_clock_still_pushes(p
     assert push(sensors, "replay", "out").code == 0
 
 
+@pytest.mark.long
 def test_stamps_from_the_future_do_not_hide_a_silent_sensor(push, sensors):
     """Silent after two and a half seconds, while it pushes: within 160 ms the run stops, not three seconds later."""
     done = push(

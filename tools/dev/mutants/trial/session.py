@@ -128,8 +128,10 @@ def _child(root: Path, files: list[str], wanted: list[str] | None, out: Path, *,
 
 
 def _move_to(root: Path) -> None:
-    sys.dont_write_bytecode = True
-    os.environ.update(PYTHONPATH=str(root), PYTHONDONTWRITEBYTECODE="1")
+    # Each session would compile the program and rewrite its tests' assertions again where byte code is not kept.
+    sys.dont_write_bytecode = False
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ["PYTHONPATH"] = str(root)
     here = {"", str(ROOT), str(ROOT.resolve())}
     sys.path[:] = [str(root), *(entry for entry in sys.path if entry not in here)]
     for name in list(sys.modules):

@@ -33,14 +33,17 @@ class Tree:
     def changed(self, path: str, source: bytes) -> Iterator[None]:
         """Temporarily replace the content of the file at `path`.
 
-        Its byte code is deleted: Python would trust an old one of the same second and size. The tests write none.
+        Its byte code is deleted before and after: Python would trust an old one of the same second and size.
         """
         file = self.root / path
         original = file.read_bytes()
-        for compiled in file.parent.glob(f"__pycache__/{file.stem}.*.pyc"):
-            compiled.unlink()
-        file.write_bytes(source)
+        self._write(file, source)
         try:
             yield
         finally:
-            file.write_bytes(original)
+            self._write(file, original)
+
+    def _write(self, file: Path, source: bytes) -> None:
+        for compiled in file.parent.glob(f"__pycache__/{file.stem}.*.pyc"):
+            compiled.unlink()
+        file.write_bytes(source)
