@@ -109,7 +109,7 @@ def play(state: Path, folder: Path, blow: Blow, host: HostWatch) -> Found:
                 blame_the_host(host, began_ns, run.process.poll() or 0, run.err)
                 raise
         time.sleep(blow.later_s)
-        pids = _pids(run, folder)
+        pids = _pids_with(blow.who, run, folder)
         at_ns = time.monotonic_ns()
         struck = [pids[who] for who in blow.who if who in pids and _sent(pids[who], blow.number)]
         time.sleep(0.5)
@@ -117,6 +117,9 @@ def play(state: Path, folder: Path, blow: Blow, host: HostWatch) -> Found:
         ended, gone_ns = _ended(run, blow, struck)
         run.wait_gone(GONE_WITHIN_S)
     assert "Traceback" not in ended.err, ended.err
+    assert struck, f"nobody was there to be struck: {ended.err}"
+    slept = blow.number == STOP and len(blow.who) > 1  # all for a moment, before anything moved: it may go on
+    assert ended.code or blow.phase == "retreat" or (slept and blow.phase == "opening"), ended.err
     log = _whole_log(folder)
     if ended.code == 0:
         assert log == folder / "run.mcap", f"exit code 0 without a whole log: {ended.err}"
@@ -135,6 +138,15 @@ def _sent(pid: int, number: int) -> bool:
         os.kill(pid, number)
         return True
     return False
+
+
+def _pids_with(who: tuple[str, ...], run: Run, folder: Path) -> dict[str, int]:
+    """Return the processes that there are, once one of `who` is among them."""
+    deadline_s = time.monotonic() + 20.0
+    while not set(who) & set(pids := _pids(run, folder)):
+        assert time.monotonic() < deadline_s, f"none of {who} was started: {run.err}"
+        time.sleep(0.01)
+    return pids
 
 
 def _pids(run: Run, folder: Path) -> dict[str, int]:
@@ -237,9 +249,9 @@ def in_words(found: Found) -> str:
 
 
 def worst(found: list[Found]) -> str:
-    """Return the worst of the rounds in which the host kept still."""
-    quiet = [one for one in found if one.stall_ms <= STALL_MS]
-    lines = [f"{len(found)} rounds, {len(quiet)} of them on a quiet host"]
+    """Return the worst of the rounds in which one process was struck and the host kept still."""
+    quiet = [one for one in found if one.stall_ms <= STALL_MS and one.blow.name != "all"]
+    lines = [f"{len(found)} rounds, {len(quiet)} of them at one process on a quiet host"]
     for name, value in (("time to zero", "zero_ms"), ("time to rest", "rest_ms"), ("way", "way_m"), ("end", "gone_s")):
         seen = [one for one in quiet if getattr(one, value) is not None]
         if seen:

@@ -14,14 +14,12 @@ import pytest
 
 from safety.motion_bounds import PATH_RATIO
 from tests.host_watch import UNMEASURED
-from tests.push_runs import QUICK, started
+from tests.push_runs import QUICK, SPOILING_MS, started
 from tests.safety.normal_pushes import in_words, pushes, settings_of
 
 SEEDS = 200
 EMULATED, EMULATED_TRIES = 20, 60
 EMULATED_M = (0.3, 0.4, 0.5)
-STALL_MS = 8.0
-"""The shortest pause of the host that is noticed at all."""
 
 
 @pytest.mark.long
@@ -39,7 +37,7 @@ def test_two_hundred_seeds_at_level_sim_meet_no_fault():
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_twenty_seeds_at_level_emulated_meet_no_fault(state, tmp_path, host):
-    """Only pushes during which no processor of this host stood still are counted."""
+    """A push with a fault is left out where a processor of this host stood still: it has real time to keep."""
     counted = 0
     for seed in range(EMULATED_TRIES):
         began_ns = time.monotonic_ns()
@@ -48,10 +46,9 @@ def test_twenty_seeds_at_level_emulated_meet_no_fault(state, tmp_path, host):
         stall_ms = max(host.worst_ms(began_ns, now_ns), host.worst_wait_ms(began_ns, now_ns))
         faults = summary.get("fault_counts", {})
         print(f"seed {seed}: code {code}, {faults}, host held back {stall_ms:.0f} ms")
-        if stall_ms > STALL_MS:
-            continue
-        assert (code, faults) == (0, {}), f"seed {seed}: {err}"
-        counted += 1
+        if (code, faults) == (0, {}):
+            counted += 1
+        assert (code, faults) == (0, {}) or stall_ms > SPOILING_MS, f"seed {seed}: {err}"
         if counted == EMULATED:
             return
     UNMEASURED.add(f"{EMULATED - counted} of {EMULATED} pushes at level emulated without a fault")
