@@ -48,8 +48,8 @@ class Place(NamedTuple):
     put: Callable[[TickInput, Any], TickInput]
 
 
-OWN = {"tick", "now_ns", "ft.readings"}
-"""Made by the loop itself (`ticks_of` lets them jump) or of a length of its own."""
+OWN = {"tick", "now_ns", "host.skipped", "ft.readings"}
+"""Counted by the loop itself (time jumps in `any_run`), or of a length of its own."""
 
 
 @cache

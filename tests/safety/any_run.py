@@ -180,7 +180,8 @@ def run(sequence: Sequence, ticks: int = TICKS) -> int:
     mode = bench.output.mode if bench.output is not None else 0
     rules = Rules(bench.core.safety.envelope, bench.state, mode, bench.now_ns)
     for n in range(ticks):
-        now_ns = bench.now_ns = bench.now_ns + sequence.jumps.get(n, 0) * MS
+        late_ns = sequence.jumps.get(n, 0) * MS
+        now_ns = bench.now_ns = bench.now_ns + late_ns
         tick = bench.tick
         record = gate.shell.record
 
