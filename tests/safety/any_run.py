@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.ipc.record import BASE_RECORD
 from robot_io.messages import BaseOdometry, BodyTwist, DeviceHealth, LinkState, Stamped
-from robot_io.tick import TICK_CDR, Phase, TickInput
+from robot_io.tick import TICK_CDR, ControlTick, Phase, TickInput
 from safety.gate import GateState
 from safety.gate_shell import GateShell
 from safety.motion_bounds import total_bounds
@@ -23,7 +23,6 @@ from safety.travel import MOVING_M_PER_S, Travel
 from tests.safety.any_input import FLOATS, TICKS, Change, Spoiler, drawn_changes
 from tests.safety.fold_bench import PERIOD_NS, FoldBench
 from tests.safety.fold_rules import GATE_MARGIN, ZERO, Rules, inside
-from tools.run.tick_core import tick_message
 
 MS = 1_000_000
 STARTS = ("first tick", "tare", "approach", "push", "lost", "retreat", "near its end")
@@ -191,10 +190,9 @@ def run(sequence: Sequence, ticks: int = TICKS) -> int:
             base = replace(inp.base, latched=latched, latch_cause=cause)
             return spoiler.spoil(replace(inp, base=base), n)
 
-        before = bench.state
         output = bench.fold(seen, n)
         assert bench.inp is not None
-        TICK_CDR.encode(tick_message(bench.inp, before, bench.state, output))  # as the loop does, in the same tick
+        TICK_CDR.encode(ControlTick(0, 0, bench.inp, (), bench.state, output))  # as the loop does, in the same tick
         rules.check(bench.state, output, now_ns)
         frame = GateFrame(gate.shell.gate.seq + 1, tick, now_ns, output.mode, output.command_body)
         gate.turn(bench, frame, [wrong for wrong in sequence.wrongs if wrong.at == n])
