@@ -31,6 +31,8 @@ CODECS = {
         text_and_log_codecs.mcap,
     )
 }
+MEMORY = "/dev/shm" if Path("/dev/shm").is_dir() else None
+"""A file for each of a million frames is none for a disk."""
 MILLION = 1_000_000
 SHARES = 4
 WARM_UP = 2_000
@@ -59,7 +61,7 @@ def take_in(codec: str, seed: int, share: int, count: int) -> tuple[float, int]:
     """Let a codec take in `count` spoilt frames; return the slowest (s) and the memory more than at first (KiB)."""
     draw = random.Random(f"{codec} {seed}/{share}")
     slowest_s, before_kib = 0.0, 0
-    with tempfile.TemporaryDirectory() as folder, mock.patch("time.sleep", no_sleep):
+    with tempfile.TemporaryDirectory(dir=MEMORY) as folder, mock.patch("time.sleep", no_sleep):
         turn = CODECS[codec](Path(folder))
         for number in range(count):
             if number == min(WARM_UP, count // 2):
