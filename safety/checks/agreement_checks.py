@@ -163,7 +163,7 @@ def _perhaps_stuck(state: SafetyState, inp: TickInput) -> bool:
     if not force.stuck_since_ns or math.hypot(force.sent_x, force.sent_y) > STUCK_WAIT_M:
         return False
     way = (pose.x - force.from_x) * force.sent_x + (pose.y - force.from_y) * force.sent_y
-    return way < STUCK_SHARE * (force.sent_x**2 + force.sent_y**2)
+    return way < STUCK_SHARE * (force.sent_x * force.sent_x + force.sent_y * force.sent_y)
 
 
 def _near_by_pose(then: MotionMark, now: MotionMark) -> bool:

@@ -15,6 +15,7 @@ from robot_io.tick import MotionMark, Phase
 from safety.checks import agreement_checks
 from tests.safety.fault_scenarios import base, shifted_pose, then
 from tests.safety.fold_bench import FoldBench, without_contact
+from tests.safety.normal_pushes import Nothing
 from tools.rig import resolve_rig, with_faults
 from tools.run.lockstep import Lockstep
 
@@ -180,16 +181,6 @@ def test_a_quarter_too_slow_is_caught_within_3_seconds_in_spite_of_noise(seed):
     assert 600 < first <= 900
 
 
-class Nothing:
-    """A log that keeps nothing."""
-
-    def record(self, kind, time_ns, payload):
-        pass
-
-    def tick(self, time_ns, payload, tick):
-        pass
-
-
 def quiet(seed, *overrides):
     """Run a push at level sim; return the faults of motion that it met, and its exit code."""
     ended = Lockstep(resolve_rig("sim", overrides), seed, Nothing()).run(lambda *_: None)
@@ -201,14 +192,6 @@ def quiet(seed, *overrides):
 def test_a_normal_push_meets_none_of_these(slip):
     found = quiet(5, f"world.slip={slip}", "world.floor.patch_strength=0.3", "control.distance_m=0.8")
     assert found == ([], 0)
-
-
-@pytest.mark.long
-@pytest.mark.timeout(600)
-def test_two_hundred_normal_pushes_meet_none_of_these():
-    for seed in range(200):
-        slip = 0.1 * (seed % 11) / 10
-        assert quiet(seed, f"world.slip={slip}", "world.floor.patch_strength=0.3")[0] == [], seed
 
 
 OFF = st.floats(-0.03, 0.03)
