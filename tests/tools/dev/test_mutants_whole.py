@@ -51,6 +51,8 @@ def test_exit():
     code = "import tools.shell; raise SystemExit(tools.shell.WORTH)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 7
 """
+LONG_TEST = "import pytest\n@pytest.mark.long\ndef test_long():\n    assert False\n"
+"""A file of long tests only, none of which `make test` runs."""
 MORE = "def test_more():\n    assert clamp(2) == 2\n    assert count(0) and count(6) and count(1)\n"
 
 
@@ -70,8 +72,9 @@ def project(tmp_path):
         "control/law.py": LAW,
         "tests/control/test_law.py": TEST,
         "tests/test_shell.py": SHELL_TEST,
+        "tests/control/test_long.py": LONG_TEST,
         "tests/mutants_equivalent.toml": "",
-        "pyproject.toml": '[tool.pytest.ini_options]\npythonpath = ["."]\naddopts = "--import-mode=importlib"\n',
+        "pyproject.toml": '[tool.pytest.ini_options]\npythonpath = ["."]\naddopts = "--import-mode=importlib -m \'not long\'"\nmarkers = ["long"]\n',
         ".gitignore": ".mutants/\n",
     }.items():
         (tmp_path / file).write_text(text)
