@@ -29,8 +29,6 @@ from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
 
-MOST_DESCRIPTORS = 128
-"""Files and sockets that any process of a run has open at the same time, with room to spare."""
 MAX_SEED = 2**63 - 1
 """The largest integer that the log can hold."""
 
@@ -193,6 +191,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
     launcher = None
     try:
         from tools.run.launcher import Launcher
+        from tools.run.processes import MOST_DESCRIPTORS
 
         allow_descriptors(MOST_DESCRIPTORS)
 

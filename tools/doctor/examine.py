@@ -1,0 +1,58 @@
+"""Runs all checks of a rig: its devices one after the other, then this machine, then the rig itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from robot_io.rig.config import RigConfig
+from tools.doctor.check import NAMES, Check
+from tools.doctor.emulated import emulators
+from tools.doctor.host_checks import host_checks
+from tools.doctor.rig_checks import rig_checks
+from tools.kinds import is_shipped
+from tools.rig import kinds_of
+
+DEVICES = ("ft", "arm", "base")
+Held = Mapping[str, str]
+"""Who holds a device, in words, for each device that is held."""
+
+
+def examine(rig: RigConfig, kind_folder: str, *, held: Held, faults: Sequence[str] = ()) -> list[Check]:
+    """Return every row, in order; about 10 s for a rig whose devices answer. Nothing moves.
+
+    Devices at level emulated are served meanwhile, with `faults`. Raises PushError where they cannot be served.
+    """
+    with emulators(rig, kind_folder, faults) as served:
+        checks = [check for device in DEVICES for check in _of_device(served, device, held)]
+    return [*checks, *host_checks(rig), *rig_checks(rig)]
+
+
+def _of_device(rig: RigConfig, device: str, held: Held) -> list[Check]:
+    level = {"ft": rig.ft.level, "arm": rig.arm.level, "base": rig.base.level}[device]
+    kind = kinds_of(rig)[device]
+    if level == "sim":
+        return _skipped(device, "level sim has no devices")
+    if device in held:
+        return _skipped(device, f"in use by another run ({held[device]})")
+    if not is_shipped(device, kind):
+        return _skipped(device, f"`{kind}` is not of this program")
+    return _checks(device)(rig)
+
+
+def _checks(device: str) -> Callable[[RigConfig], list[Check]]:
+    """Return the checks of a device; imported late, because level sim needs no wire."""
+    if device == "ft":
+        from tools.doctor.ft_checks import ft_checks
+
+        return ft_checks
+    if device == "arm":
+        from tools.doctor.arm_checks import arm_checks
+
+        return arm_checks
+    from tools.doctor.base_checks import base_checks
+
+    return base_checks
+
+
+def _skipped(device: str, why: str) -> list[Check]:
+    return [Check(f"{device}.{name}", "skipped", evidence=why) for name in NAMES[device]]
