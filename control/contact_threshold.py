@@ -43,8 +43,6 @@ def add(state: ContactState, force: Vector3, received_ns: int) -> ContactState:
 
 def start_window(state: ContactState) -> ContactState:
     """Return the state with an empty window: what was felt before says nothing about the contact now sought."""
-    if not state.means and not state.bucket_count:
-        return state
     return replace(state, means=(), bucket_since_ns=0, bucket_total=_NOTHING, bucket_count=0)
 
 

@@ -121,6 +121,7 @@ class ControlLoop:
         self._operator = Operator.NONE
         self._launcher, self._recorder = Silence(), Silence()
         self._consumed = 0
+        self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
         self.notes = RunNotes()
@@ -216,10 +217,9 @@ class ControlLoop:
         self.timing.note(paced.late_ns, paced.skipped, self._clock() - now_ns)
 
     def _one_tick(self, inp: TickInput) -> None:
-        before = self._state
-        after, output = self._fold(before, inp)
+        after, output = self._fold(self._state, inp)
         self._base.command(output.command_body, tick=inp.tick, mode=output.mode)
-        self._ring.push(Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, before, after, output)))
+        self._record(inp, after, output)
         self._state = after
         self.last = (inp, after, output)
         self.notes.note(inp, after, output)
@@ -233,13 +233,15 @@ class ControlLoop:
         self._loop.stop()
         self._base.command(BodyTwist(), tick=inp.tick + 1, mode=0)
         failed = replace(inp, host=replace(inp.host, loop_error=True))
-        before = self._state
-        after, output = self._fold(before, failed)
-        self._ring.push(
-            Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(ControlTick(0, 0, failed, before, after, output))
-        )
+        after, output = self._fold(self._state, failed)
+        self._recorded = False  # it may have failed behind its own record
+        self._record(failed, after, output)
         self.last = (failed, after, output)
         self.notes.note(failed, after, output)
+
+    def _record(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
+        tick = ControlTick(0, 0, inp, () if self._recorded else (self._state,), after, output)
+        self._recorded = self._ring.push(Kind.CONTROL_TICK, inp.now_ns, TICK_CDR.encode(tick))
 
     def _note_silence(self, pause_ns: int) -> None:
         self._launcher.leave_out(pause_ns)

@@ -75,10 +75,15 @@ def in_contact(settings: Settings, state: ControlState) -> bool:
     return size >= least or contact_threshold.found_by_mean(state.contact, direction, rising=False)
 
 
-def _sum_up(settings: Settings, state: ControlState, readings: tuple[FtReading, ...]) -> TareSums:
+def counted(state: ControlState) -> int:
+    """Return how many readings have been summed up in this phase."""
+    return state.tare[0].count if state.tare else 0
+
+
+def _sum_up(settings: Settings, state: ControlState, readings: tuple[FtReading, ...]) -> tuple[TareSums, ...]:
     wanted = settings.tare_readings
-    sums = state.tare
+    sums = state.tare[0] if state.tare else TareSums()
     for reading in readings:
         if sums.count < wanted and reading.received_ns > state.phase_since_ns:
             sums = add(sums, (*reading.force, *reading.torque), wanted, settings.sensor_resolution)
-    return sums
+    return (sums,) if sums.count else ()

@@ -7,13 +7,13 @@ import math
 from msgspec.structs import replace
 
 from control import contact_threshold, open_loop, push_law
-from control.sensing import in_contact
+from control.sensing import counted, in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
 from control.tare import Judgement, judge, refusal_in_contact
 from control.wrench import force_on_slider_world
 from robot_io.messages import LinkState
-from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Operator, Phase, TareSums, TickInput
+from robot_io.tick import REST_M_PER_S, REST_NS, ControlState, Operator, Phase, TickInput
 
 FRESH_NS = 100_000_000
 SETTLE_PACKETS = 20
@@ -63,7 +63,7 @@ def advance(
 
 
 def _enter(state: ControlState, phase: Phase, now_ns: int, **changes: object) -> ControlState:
-    return replace(state, phase=int(phase), phase_since_ns=now_ns, **changes)
+    return replace(state, phase=int(phase), phase_since_ns=now_ns, tare=(), **changes)
 
 
 def _wait(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
@@ -126,15 +126,15 @@ def _settle(settings: Settings, state: ControlState, inp: TickInput, along: floa
 
 def _tare(settings: Settings, state: ControlState, inp: TickInput, along: float) -> ControlState:
     if not state.rest_since_ns:  # somebody is moving the base: only readings at rest count
-        return replace(state, tare=TareSums())
-    if state.refusal or state.tare.count < settings.tare_readings:
+        return replace(state, tare=())
+    if state.refusal or counted(state) < settings.tare_readings:
         return state
     judged = judge_tare(settings, state)
     if settings.in_contact:  # the saved tare stays
         mean = judged.tare.bias[:3]
         x, y, z = force_on_slider_world(mean, state.bias_force, settings.base_from_sensor, inp.base.pose.yaw)
         force = (*settings.path.vector_to_path(x, y), z)
-        refusal = refusal_in_contact(state.tare, settings.scatters, force)
+        refusal = refusal_in_contact(state.tare[0], settings.scatters, force)
         return replace(state, refusal=int(refusal)) if refusal else _enter(state, Phase.APPROACH, inp.now_ns)
     if judged.refusal:
         return replace(state, refusal=int(judged.refusal))
@@ -282,8 +282,8 @@ def _retreat(settings: Settings, state: ControlState, inp: TickInput, contact: t
 def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
     """Compare the tare with the mean of as many readings, taken at rest again."""
     if not _rested(state, inp.now_ns, REST_NS):
-        return replace(state, speed=0.0, tare=TareSums())
-    if state.tare.count < settings.tare_readings:
+        return replace(state, speed=0.0, tare=())
+    if counted(state) < settings.tare_readings:
         return state
     mean = judge_tare(settings, state).tare.bias
     return _enter(state, Phase.DONE, inp.now_ns, residual_N=math.dist(mean[:3], state.bias_force))
@@ -292,5 +292,5 @@ def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlSt
 def judge_tare(settings: Settings, state: ControlState) -> Judgement:
     """Return the tare of the readings summed so far, judged by the figures that the sensor declares."""
     return judge(
-        state.tare, settings.sensor_noise, settings.sensor_range, settings.sensor_resolution, settings.scatters
+        state.tare[0], settings.sensor_noise, settings.sensor_range, settings.sensor_resolution, settings.scatters
     )

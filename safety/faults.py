@@ -188,4 +188,4 @@ def limit_of(fault: Fault, settings: SafetySettings) -> float | None:
 
 def strongest(ids: tuple[str, ...]) -> Mode:
     """Return the strongest reaction among active faults, SILENT (no reaction) when there is none."""
-    return max((FAULTS[i].mode for i in ids), default=Mode.SILENT)
+    return max([FAULTS[i].mode for i in ids]) if ids else Mode.SILENT

@@ -37,6 +37,11 @@ REST_AT_MOST_NS = 1_500_000_000
 failed."""
 HELD_NS = 2_000_000_000
 """A HOLD that cannot clear by itself ends the run after this long at zero."""
+_CHECKS = (
+    *(force_checks, sensor_checks, stuck_checks, arm_checks),
+    *(base_checks, link_checks, motion_checks, agreement_checks, workspace_checks),
+)
+"""The force first: it compares with the last reading, on which the sensor's check moves on."""
 STALENESS = ("F01", "F24", "F25", "F31", "F40", "F67-late")
 """Faults of stale data: right after a pause of this host they say more about the host than about the device."""
 
@@ -67,11 +72,11 @@ def supervise(
     """
     state, faults = _gather(settings, state, inp, control, wanted, clamped)
     faults = _after_pause(state, inp, faults)
-    state = replace(state, grace_ticks=1 if _pause(state, inp) else 0)
     new = tuple(str(i) for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in state.latched)
     latched = state.latched + new
     asked = max(strongest(tuple(faults)), strongest(latched))
-    mode, state = _next_mode(replace(state, latched=latched), asked, control, inp.now_ns)
+    state = replace(state, latched=latched, grace_ticks=1 if _pause(state, inp) else 0)
+    mode, state = _next_mode(state, asked, control, inp.now_ns)
     stopping = mode >= Mode.STOP
     stop_since = (state.stop_since_ns or inp.now_ns) if stopping else 0
     state = _note_first(replace(state, mode=int(mode), stop_since_ns=stop_since), faults, inp.now_ns)
@@ -130,13 +135,8 @@ def _gather(
         faults.append("F36")
     if control.phase == Phase.SETTLE:  # nothing moves yet, and a device that has sent no data is not a fault
         return force_checks.note(sensor_checks.note(state, inp), inp), faults
-    # The force first: it compares with the last reading, on which the sensor's check moves on.
-    checks = (
-        *(force_checks, sensor_checks, stuck_checks, arm_checks),
-        *(base_checks, link_checks, motion_checks, agreement_checks, workspace_checks),
-    )
-    for check in (module.check for module in checks):
-        state, found = check(settings, state, inp, control)
+    for module in _CHECKS:
+        state, found = module.check(settings, state, inp, control)
         faults += found
     return state, faults
 
@@ -175,7 +175,7 @@ def _next_mode(state: SafetyState, asked: Mode, control: ControlState, now_ns: i
         if now_ns - since < CLEAN_NS:
             return current, replace(state, clean_since_ns=since)
         return Mode(current - 1), replace(state, clean_since_ns=since)
-    return base, replace(state, clean_since_ns=0)
+    return base, replace(state, clean_since_ns=0) if state.clean_since_ns else state
 
 
 def _working_mode(control: ControlState) -> Mode:

@@ -18,8 +18,9 @@ from typing import Generic, TypeVar
 
 import msgspec
 
-from robot_io.cdr.parts import HEADER_BYTES, Layout, NotThisType
+from robot_io.cdr.parts import Layout
 from robot_io.cdr.shape import Nested, schema_text, shape_of
+from robot_io.cdr.wire import HEADER_BYTES, NotThisType
 from robot_io.errors import LogDamaged
 
 MessageT = TypeVar("MessageT", bound=msgspec.Struct)

@@ -13,9 +13,9 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from robot_io.cdr.parts import HEADER_BYTES, NotThisType
 from robot_io.cdr.schema import ONLY_FIELD_OF_EMPTY
 from robot_io.cdr.shape import PRIMITIVES, Many, Nested, Scalar, Shape, Text
+from robot_io.cdr.wire import HEADER_BYTES, NotThisType
 from robot_io.errors import LogDamaged
 
 _PADDING_MAX = 3

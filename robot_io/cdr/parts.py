@@ -1,37 +1,45 @@
 """How the fields of a Struct are written as CDR and read back; used through `cdr.CdrType`.
 
-Neighbouring numbers, also across nested Structs, form a run that is packed by one `struct.Struct` call, with one
-format for each of the eight offsets at which the run may start. Fields of variable length are parts of their own.
+Neighbouring numbers, also across nested Structs, form a run that is unpacked by one `struct.Struct` call, with one
+format for each of the eight offsets at which the run may start. Fields of variable length are parts of their own. All
+that is nothing but numbers between two others is packed by one call, with a format for each set of lengths.
 Reading accepts only what writing would produce, padding included, and makes nothing larger than the payload.
 """
 
 from __future__ import annotations
 
 import struct
-from abc import ABC, abstractmethod
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Iterator
+from itertools import groupby
 from typing import Any
 
-from robot_io.cdr.packer import Build, Packed, Write, WriterCall, writer_of
+from robot_io.cdr.packer import Build, Fixed, Packed, Sequence, Write, WriterCall, flattener_of, writer_of
 from robot_io.cdr.shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text, builder, leaves
+from robot_io.cdr.wire import (
+    HEADER_BYTES,
+    Item,
+    NotThisType,
+    Part,
+    aligned,
+    format_of,
+    read_count,
+    read_text,
+    write_blob,
+    write_count,
+    write_text,
+)
 
-HEADER_BYTES = 4
-"""Alignment counts from behind these bytes of encapsulation header."""
-
-_COUNT = struct.Struct("<I")
-
-
-class NotThisType(Exception):
-    """The bytes are not a message of the wanted type."""
+_COUNT = Scalar("uint32")
+_MOST_PACKS = 1000
+"""More combinations of lengths than a run's ticks have; beyond it those kept are made anew."""
 
 
 class Layout:
     """A Struct as a row of parts that are written and read one after another."""
 
     def __init__(self, shape: Nested) -> None:
-        self._parts: list[_Part] = []
-        run: list[tuple[str, Scalar, int | None]] = []
+        self._parts: list[Part] = []
+        run: list[Item] = []
         self.min_bytes = 0
         for path, leaf in leaves(shape):
             match leaf:
@@ -57,7 +65,7 @@ class Layout:
     def write(self, value: Any, out: bytearray) -> None:
         """Append `value` to `out`, which starts with the encapsulation header."""
         if self._write is None:
-            self._write = writer_of([part.writing() for part in self._parts], HEADER_BYTES)
+            self._write = writer_of(_joined(self._parts), HEADER_BYTES)
         self._write(value, out)
 
     def read(self, payload: bytes, at: int) -> tuple[Any, int]:
@@ -70,34 +78,23 @@ class Layout:
         return self._build(found), at
 
 
-class _Part(ABC):
-    """Some neighbouring fields of a message; `min_bytes` is the least they can take."""
-
-    min_bytes: int
-
-    @abstractmethod
-    def writing(self) -> Packed | WriterCall:
-        """Return how it is written."""
-
-    @abstractmethod
-    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
-        """Append the fields found at `at` to `found`; return where they end."""
-
-
-class _Run(_Part):
+class _Run(Part):
     """Numbers and fixed arrays of numbers, packed in one call."""
 
-    def __init__(self, items: list[tuple[str, Scalar, int | None]]) -> None:
-        self._paths = [(path, count) for path, _, count in items]
-        self._packers = [struct.Struct(_format(items, start)) for start in range(8)]
+    def __init__(self, items: list[Item]) -> None:
+        self._items = items
+        self._packers = [struct.Struct(format_of(items, start)) for start in range(8)]
         # Only these bytes can differ from what would be written again: padding, and bools.
         self._loose = [
             "x" in packer.format or any(scalar.ros == "bool" for _, scalar, _ in items) for packer in self._packers
         ]
         self.min_bytes = sum(PRIMITIVES[scalar.ros][1] * (count or 1) for _, scalar, count in items)
 
-    def writing(self) -> Packed:
-        return Packed(self._paths, [packer.pack for packer in self._packers])
+    def writing(self) -> Fixed:
+        return Fixed([(path, count) for path, _, count in self._items])
+
+    def items(self, counts: Iterator[int]) -> list[Item]:
+        return self._items
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         offset = (at - HEADER_BYTES) & 7
@@ -112,7 +109,7 @@ class _Run(_Part):
         return end
 
 
-class _Text(_Part):
+class _Text(Part):
     """A string."""
 
     min_bytes = 5
@@ -121,15 +118,15 @@ class _Text(_Part):
         self._path = path
 
     def writing(self) -> WriterCall:
-        return WriterCall(self._path, _write_text)
+        return WriterCall(self._path, write_text)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
-        text, at = _read_text(payload, at)
+        text, at = read_text(payload, at)
         found.append(text)
         return at
 
 
-class _Blob(_Part):
+class _Blob(Part):
     """Raw bytes."""
 
     min_bytes = 4
@@ -138,15 +135,15 @@ class _Blob(_Part):
         self._path = path
 
     def writing(self) -> WriterCall:
-        return WriterCall(self._path, _write_blob)
+        return WriterCall(self._path, write_blob)
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
-        count, at = _read_count(payload, at, 1)
+        count, at = read_count(payload, at, 1)
         found.append(bytes(payload[at : at + count]))
         return at + count
 
 
-class _Numbers(_Part):
+class _Numbers(Part):
     """A sequence of numbers."""
 
     min_bytes = 4
@@ -154,22 +151,21 @@ class _Numbers(_Part):
     def __init__(self, path: str, scalar: Scalar) -> None:
         self._path = path
         self._code, self._size = PRIMITIVES[scalar.ros]
+        self._scalar = scalar
         self._enum = scalar.enum
 
-    def writing(self) -> WriterCall:
-        return WriterCall(self._path, self._write)
+    def writing(self) -> Sequence:
+        return Sequence(self._path, None)
 
-    def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
-        _write_count(len(values), out)
-        if values:
-            _pad(out, self._size)
-            out += struct.pack(f"<{len(values)}{self._code}", *values)
+    def items(self, counts: Iterator[int]) -> list[Item]:
+        count = next(counts)
+        return [("", _COUNT, None), *([("", self._scalar, count)] if count else [])]
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
-        count, at = _read_count(payload, at, self._size)
+        count, at = read_count(payload, at, self._size)
         values: tuple[Any, ...] = ()
         if count:
-            at = _aligned(payload, at, self._size)
+            at = aligned(payload, at, self._size)
             form = f"<{count}{self._code}"
             values = struct.unpack_from(form, payload, at)
             if self._code == "?" and struct.pack(form, *values) != payload[at : at + count]:
@@ -182,7 +178,7 @@ class _Numbers(_Part):
         return at
 
 
-class _Items(_Part):
+class _Items(Part):
     """A sequence, or a fixed array, of Structs or strings."""
 
     def __init__(self, path: str, element: Nested | Text, count: int | None) -> None:
@@ -194,17 +190,17 @@ class _Items(_Part):
             self._read: Callable[[bytes, int], tuple[Any, int]] = layout.read
             self._element_min = layout.min_bytes
         else:
-            self._write_one = _write_text
-            self._read = _read_text
+            self._write_one = write_text
+            self._read = read_text
             self._element_min = _Text.min_bytes
         self.min_bytes = 4 if count is None else count * self._element_min
 
-    def writing(self) -> WriterCall:
+    def writing(self) -> Sequence | WriterCall:
         return WriterCall(self._path, self._write)
 
     def _write(self, values: tuple[Any, ...], out: bytearray) -> None:
         if self._count is None:
-            _write_count(len(values), out)
+            write_count(len(values), out)
         elif len(values) != self._count:
             raise ValueError(f"an array of {len(values)} elements instead of {self._count}")
         for value in values:
@@ -212,7 +208,7 @@ class _Items(_Part):
 
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         if self._count is None:
-            count, at = _read_count(payload, at, self._element_min)
+            count, at = read_count(payload, at, self._element_min)
         else:
             count = self._count
         values = []
@@ -223,7 +219,21 @@ class _Items(_Part):
         return at
 
 
-def _variable_part(path: str, leaf: Shape) -> _Part:
+class _Rows(_Items):
+    """A sequence of Structs that hold nothing but numbers."""
+
+    def __init__(self, path: str, element: Nested, columns: list[Item]) -> None:
+        super().__init__(path, element, None)
+        self._columns = columns
+
+    def writing(self) -> Sequence:
+        return Sequence(self._path, flattener_of([(path, count) for path, _, count in self._columns]))
+
+    def items(self, counts: Iterator[int]) -> list[Item]:
+        return [("", _COUNT, None), *(self._columns * next(counts))]
+
+
+def _variable_part(path: str, leaf: Shape) -> Part:
     match leaf:
         case Text(wide=False):
             return _Text(path)
@@ -231,68 +241,52 @@ def _variable_part(path: str, leaf: Shape) -> _Part:
             return _Blob(path)
         case Many(Scalar() as element, None):
             return _Numbers(path, element)
+        case Many(Nested() as element, None) if (columns := _fixed_items(element)) is not None:
+            return _Rows(path, element, columns)
         case Many((Nested() | Text(wide=False)) as element, count):
             return _Items(path, element, count)
     raise TypeError(f"{path}: {leaf!r} has no CDR form")
 
 
-def _format(items: list[tuple[str, Scalar, int | None]], start: int) -> str:
-    form, at = "<", start
-    for _, scalar, count in items:
-        code, size = PRIMITIVES[scalar.ros]
-        gap = -at % size
-        form += f"{gap}x" if gap else ""
-        form += code if count is None else f"{count}{code}"
-        at += gap + size * (count or 1)
-    return form
+def _fixed_items(shape: Nested) -> list[Item] | None:
+    """Return the numbers of a Struct that holds nothing else, None for any other."""
+    items: list[Item] = []
+    for path, leaf in leaves(shape):
+        match leaf:
+            case Scalar():
+                items.append((path, leaf, None))
+            case Many(Scalar() as element, int() as count):
+                items.append((path, element, count))
+            case _:
+                return None
+    return items
 
 
-def _pad(out: bytearray, size: int) -> None:
-    gap = (HEADER_BYTES - len(out)) % size
-    if gap:
-        out += bytes(gap)
+class _Packs(dict[tuple[int, ...], Callable[..., bytes]]):
+    """What packs some neighbouring parts, by offset modulo 8 and the number of elements of each sequence."""
+
+    def __init__(self, parts: list[Part]) -> None:
+        super().__init__()
+        self._parts = parts
+
+    def __missing__(self, key: tuple[int, ...]) -> Callable[..., bytes]:
+        if len(self) >= _MOST_PACKS:
+            self.clear()
+        start, *counts = key
+        left = iter(counts)
+        items = [item for part in self._parts for item in part.items(left)]
+        self[key] = struct.Struct(format_of(items, start)).pack
+        return self[key]
 
 
-def _aligned(payload: bytes, at: int, size: int) -> int:
-    end = at + (-(at - HEADER_BYTES) % size)
-    if any(payload[at:end]):
-        raise NotThisType("padding that is not zero")
-    return end
-
-
-def _write_count(count: int, out: bytearray) -> None:
-    _pad(out, 4)
-    out += _COUNT.pack(count)
-
-
-def _read_count(payload: bytes, at: int, element_bytes: int) -> tuple[int, int]:
-    at = _aligned(payload, at, 4)
-    (count,) = _COUNT.unpack_from(payload, at)
-    at += 4
-    if count * element_bytes > len(payload) - at:  # before anything of that size is made
-        raise NotThisType(f"{count} elements cannot fit")
-    return int(count), at
-
-
-def _write_blob(value: bytes, out: bytearray) -> None:
-    _write_count(len(value), out)
-    out += value
-
-
-def _write_text(text: str, out: bytearray) -> None:
-    _pad(out, 4)
-    out += _text_bytes(text)
-
-
-@lru_cache(maxsize=500)  # frame names, in every header
-def _text_bytes(text: str) -> bytes:
-    raw = text.encode()
-    return _COUNT.pack(len(raw) + 1) + raw + b"\x00"
-
-
-def _read_text(payload: bytes, at: int) -> tuple[str, int]:
-    size, at = _read_count(payload, at, 1)
-    end = at + size
-    if size == 0 or payload[end - 1] != 0:
-        raise NotThisType("a string without its terminator")
-    return payload[at : end - 1].decode(), end
+def _joined(parts: list[Part]) -> list[Packed | WriterCall]:
+    """Return how the parts are written: neighbours that are nothing but numbers by one call."""
+    joined: list[Packed | WriterCall] = []
+    for is_numbers, group in groupby(parts, lambda part: isinstance(part, _Run | _Numbers | _Rows)):
+        together = list(group)
+        written = [part.writing() for part in together]
+        if is_numbers:
+            joined.append(Packed([one for one in written if not isinstance(one, WriterCall)], _Packs(together)))
+        else:
+            joined.extend(one for one in written if isinstance(one, WriterCall))
+    return joined

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 from robot_io.errors import LogDamaged, UsageError
 from robot_io.log.format_1 import arm_state
+from robot_io.log.format_2 import always, sums_count
 
-LOG_FORMAT = 2
+LOG_FORMAT = 3
 FORMAT_FACT = "format"
 """Where a log's metadata `run` says its format; the first one said nothing."""
 _FIRST_FORMAT = 1
@@ -48,6 +49,18 @@ class ComputedValue(NamedTuple):
     last_format: int
 
 
+class NowOptional(NamedTuple):
+    """Logs up to `last_format` hold one message in `field` of `type_name`, today a sequence of at most one.
+
+    `counts` says of the message that holds the field whether what it held there would be in it today.
+    """
+
+    type_name: str
+    field: str
+    counts: Callable[[Any], bool]
+    last_format: int
+
+
 class ChangedTopic(NamedTuple):
     """Logs up to `last_format` derived the messages of `topic` in another way, so that they cannot be compared."""
 
@@ -58,6 +71,10 @@ class ChangedTopic(NamedTuple):
 RENAMED_FIELDS: tuple[RenamedField, ...] = ()
 EARLIER_VALUES: tuple[EarlierValue, ...] = ()
 COMPUTED_VALUES = (ComputedValue("push_msgs/msg/ArmRecord", "joints.state", arm_state, 1),)
+NOW_OPTIONAL = (
+    NowOptional("push_msgs/msg/ControlTick", "before", always, 2),
+    NowOptional("push_msgs/msg/ControlState", "tare", sums_count, 2),
+)
 CHANGED_TOPICS = (ChangedTopic("/diagnostics", 1), ChangedTopic("/safety/event", 1), ChangedTopic("/rosout", 1))
 
 

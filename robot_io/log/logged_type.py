@@ -51,6 +51,10 @@ class LoggedType(Generic[MessageT]):
         """Return whether the log's messages are today's, byte for byte."""
         return self._logged is None
 
+    def holds_all_of(self, path: str) -> bool:
+        """Return whether the part at a dotted path has the same fields in the log as today."""
+        return not any(field.startswith(path) for field in self.missing | self.gone)
+
     def decode(self, payload: bytes) -> MessageT:
         """Return the message of a payload as today's. Raises LogDamaged when it is none of the log's own type."""
         if self._logged is None:
@@ -76,6 +80,9 @@ class _Maker:
 
     def __init__(self, log_format: int) -> None:
         self._format = log_format
+        self._now_optional = {
+            (name, field): counts for name, field, counts, last in table.NOW_OPTIONAL if log_format <= last
+        }
         self.missing: set[str] = set()
         self.gone: set[str] = set()
 
@@ -89,13 +96,16 @@ class _Maker:
             here = f"{path}{name}"
             kept, its_shape = ours.pop(name.lower(), (name, None))
             convert = None if its_shape is None else self._shape(shape, its_shape, here)
+            counts = self._now_optional.get((today.ros_name, name))
+            if counts is not None and isinstance(shape, Many) and its_shape is not None:
+                convert = self._shape(shape.element, its_shape, here)
             if convert is None:
                 self.missing.add(here)
                 if its_shape is not None:
                     self.gone.add(here)
                 values.append(_constant(self._default(today, name, shape)))
             else:
-                values.append(_field(kept, convert))
+                values.append(_field(kept, convert) if counts is None else _optional(kept, convert, counts))
         self.gone |= {f"{path}{name}" for name in ours}
         make = today.struct_type
         computed = [
@@ -168,6 +178,10 @@ def _constant(value: Any) -> Convert:
 
 def _field(name: str, convert: Convert) -> Convert:
     return lambda message: convert(getattr(message, name))
+
+
+def _optional(name: str, convert: Convert, counts: Callable[[Any], bool]) -> Convert:
+    return lambda message: (convert(getattr(message, name)),) if counts(message) else ()
 
 
 def _as_it_is(value: Any) -> Any:

@@ -99,7 +99,8 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     """Why the start was refused: 0 not, 1 unsettled, 2 nearly saturated, 3 dead axis, 4 implausible force."""
     bias_force: Vector3 = (0.0, 0.0, 0.0)
     bias_torque: Vector3 = (0.0, 0.0, 0.0)
-    tare: TareSums = TareSums()
+    tare: tuple[TareSums, ...] = ()
+    """At most one: of the readings that count in this phase, TARE or CHECK, so far."""
     last_reading_ns: int = 0
     force_world: Vector3 = (0.0, 0.0, 0.0)
     """Filtered force on the slider, N, WORLD frame."""

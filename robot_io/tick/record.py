@@ -44,13 +44,19 @@ class TickOutput(msgspec.Struct, frozen=True, gc=False):
 
 
 class ControlTick(msgspec.Struct, frozen=True, gc=False):
-    """The message on `/control/tick`. `crc32_before` chains it to the message before (0 at the start of a file)."""
+    """The message on `/control/tick`. `crc32_before` chains it to the message before (0 at the start of a file).
+
+    The state before a tick is `after` of the message before. It is in the message itself only where that one is no
+    tick of the same fold, or missing: at the start of a log, after records that did not fit into the ring, and in a
+    tick that failed.
+    """
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/ControlTick"
     crc32_before: U32
     reserved: U32
     input: TickInput
-    before: TickState
+    before: tuple[TickState, ...]
+    """At most one."""
     after: TickState
     output: TickOutput
 

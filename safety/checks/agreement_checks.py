@@ -53,6 +53,9 @@ TURN_FLOOR_RAD = 0.035
 TURN_NOISE_RAD_PER_SQRT_S = 0.012
 """Five times the noise of odometry's turn rate, added up as above."""
 
+SURE = 0.999
+"""Below this share of a floor no rounding of what follows makes a difference too large."""
+
 COMMAND_FLOOR_M = 0.012
 COMMAND_TIMING_S = 0.35
 """The base follows a command within 0.1 s; that it stands still is told sooner by F33."""
@@ -81,17 +84,17 @@ def check(
         return replace(state, motion=replace(motion, pose_ns=state.pose_ns, marks=(_mark(motion, state),))), []
     now = _mark(motion, state)
     if state.pose_ns != motion.pose_ns and not state.pose_jumps and not settings.pose_is_odometry:
-        off = max(_of_pose(mark, now, inp) for mark in motion.marks)
+        off = max((_of_pose(mark, now, inp) for mark in motion.marks if not _near_by_pose(mark, now)), default=0.0)
         motion = _note_place(
             replace(motion, pose_ns=state.pose_ns, pose_run=motion.pose_run + 1 if off > 1.0 else 0), now
         )
         if motion.pose_run >= RUN and not _perhaps_stuck(state, inp):
             faults.append(Finding("F43" if _way_at_one_place(motion) > STILL_WAY_M else "F37", off))
-    off = max(_of_command(mark, now, inp) for mark in motion.marks)
-    motion = replace(motion, command_run=motion.command_run + 1 if off > 1.0 else 0)
+    off = max((_of_command(mark, now, inp) for mark in motion.marks if not _near_by_command(mark, now)), default=0.0)
+    motion = replace(motion, command_run=motion.command_run + 1 if off > 1.0 else 0, marks=_kept(motion.marks, now))
     if motion.command_run >= RUN:
         faults.append(Finding("F33-way", off))
-    return replace(state, motion=replace(motion, marks=_kept(motion.marks, now))), faults
+    return replace(state, motion=motion), faults
 
 
 def _add_up(motion: MotionState, state: SafetyState, inp: TickInput) -> MotionState:
@@ -161,6 +164,21 @@ def _perhaps_stuck(state: SafetyState, inp: TickInput) -> bool:
         return False
     way = (pose.x - force.from_x) * force.sent_x + (pose.y - force.from_y) * force.sent_y
     return way < STUCK_SHARE * (force.sent_x**2 + force.sent_y**2)
+
+
+def _near_by_pose(then: MotionMark, now: MotionMark) -> bool:
+    """Return whether pose and odometry differ so little since then that every direction and time allows it."""
+    return (
+        math.hypot(now.x - then.x - now.way_x + then.way_x, now.y - then.y - now.way_y + then.way_y) < SURE * FLOOR_M
+        and abs(now.yaw - then.yaw - now.way_yaw + then.way_yaw) < SURE * TURN_FLOOR_RAD
+    )
+
+
+def _near_by_command(then: MotionMark, now: MotionMark) -> bool:
+    """Return the same of odometry and command."""
+    x = now.way_x - then.way_x - now.sent_x + then.sent_x
+    y = now.way_y - then.way_y - now.sent_y + then.sent_y
+    return math.hypot(x, y) < SURE * COMMAND_FLOOR_M
 
 
 def _of_pose(then: MotionMark, now: MotionMark, inp: TickInput) -> float:

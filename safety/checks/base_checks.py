@@ -117,9 +117,18 @@ def _of_pose(
     if base.pose_seq != state.pose_seq:
         jumps = _jumps(settings, state, inp)
         # A jump keeps the old reference, so that a pose that stays away is counted each time.
-        if jumps == 0:
-            state = replace(state, pose_x=pose.x, pose_y=pose.y, pose_yaw=pose.yaw, pose_ns=base.pose_received_ns)
-        state = replace(state, pose_seq=base.pose_seq, pose_jumps=jumps)
+        if jumps:
+            state = replace(state, pose_seq=base.pose_seq, pose_jumps=jumps)
+        else:
+            state = replace(
+                state,
+                pose_seq=base.pose_seq,
+                pose_jumps=0,
+                pose_x=pose.x,
+                pose_y=pose.y,
+                pose_yaw=pose.yaw,
+                pose_ns=base.pose_received_ns,
+            )
     if state.pose_jumps >= JUMPS:
         faults.append("F41")
     turned = abs(math.remainder(pose.yaw - control.held_yaw, math.tau))

@@ -66,7 +66,8 @@ def check(
     if group == RETREAT and moving_s > bounds.retreat_s:
         faults.append(Finding("F46-retreat", moving_s))
     aside = _aside_deg(motion, state) if group != RETREAT and state.mode < Mode.STOP else 0.0
-    motion = replace(motion, aside_run=motion.aside_run + 1 if aside > ASIDE_DEG else 0)
+    if aside > ASIDE_DEG or motion.aside_run:
+        motion = replace(motion, aside_run=motion.aside_run + 1 if aside > ASIDE_DEG else 0)
     if motion.aside_run >= ASIDE_TICKS:
         faults.append(Finding("F59", aside))
     return replace(state, motion=motion), faults

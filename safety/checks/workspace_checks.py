@@ -56,8 +56,9 @@ def check(
             faults.append(Finding("R06", left))
     edge = workspace.given or tuple(zip(state.workspace.corners_x, state.workspace.corners_y, strict=True))
     ahead = _ahead(workspace, inp, pose.yaw, (inp.now_ns - state.pose_ns) * 1e-9)
+    here = distance_inside(edge, pose.x, pose.y) - math.hypot(workspace.half_length, workspace.half_width)
     left_slow, left_stop = (
-        min(_room_of_base(workspace, edge, pose, shifts), _room_of_object(workspace, slider, shifts))
+        min(_room_of_base(workspace, edge, pose, shifts, here), _room_of_object(workspace, slider, shifts))
         for shifts in (ahead.slow, ahead.stop)
     )
     if left_stop < 0.0:
@@ -97,11 +98,12 @@ def _ahead(workspace: WorkspaceSettings, inp: TickInput, yaw: float, age_s: floa
     return _Ahead(slow, stop)
 
 
-def _room_of_base(workspace: WorkspaceSettings, edge: Polygon, pose: Pose2D, shifts: list[_Shift]) -> float:
-    """Return the least room (m) of the base's outline there."""
+def _room_of_base(
+    workspace: WorkspaceSettings, edge: Polygon, pose: Pose2D, shifts: list[_Shift], here: float
+) -> float:
+    """Return the least room (m) of the base's outline there; `here`: the least it has at its pose, however turned."""
     length, width = workspace.half_length, workspace.half_width
-    furthest = max(math.hypot(dx, dy) for dx, dy, _ in shifts)
-    far = distance_inside(edge, pose.x, pose.y) - math.hypot(length, width) - furthest
+    far = here - max([math.hypot(dx, dy) for dx, dy, _ in shifts])
     if far > 0.0:  # in the middle of the floor, as nearly always
         return far
     return min(

@@ -72,7 +72,7 @@ def window(*newtons, state=None):
     return contact_threshold.add(state, (0.0, 0.0, 0.0), at)
 
 
-@pytest.mark.parametrize(("newton", "found"), [(2.49, False), (2.51, True), (-9.0, False)])
+@pytest.mark.parametrize(("newton", "found"), [(2.49, False), (2.5, True), (-9.0, False)])
 def test_a_mean_of_two_and_a_half_newton_over_half_a_second_is_contact(newton, found):
     assert contact_threshold.found_by_mean(window(*[newton] * 5), AHEAD, rising=True) is found
 
@@ -86,7 +86,7 @@ def test_only_the_part_along_the_motion_counts():
     assert contact_threshold.found_by_mean(window(*[4.0] * 5), (0.8, 0.6), rising=True)
 
 
-@pytest.mark.parametrize(("before", "found"), [(0.0, True), (1.49, True), (1.51, False), (3.0, False)])
+@pytest.mark.parametrize(("before", "found"), [(0.0, True), (1.5, True), (1.51, False), (3.0, False)])
 def test_a_first_contact_rises_and_a_drift_does_not(before, found):
     state = window(*[before] * 5, *[3.0] * 5)
     assert contact_threshold.found_by_mean(state, AHEAD, rising=True) is found
@@ -98,6 +98,38 @@ def test_the_window_holds_one_second():
     assert len(state.means) == 30
     assert contact_threshold.felt(state, AHEAD) == pytest.approx(1.0)
     assert contact_threshold.start_window(state) == ContactState()
+
+
+def test_a_new_search_begins_with_an_empty_window():
+    """Also where only a part of a tenth of a second was felt."""
+    begun = contact_threshold.add(ContactState(lost_below_N=3.0), (9.0, 1.0, 2.0), 5 * MS)
+    assert begun.bucket_count == 1
+    assert contact_threshold.start_window(begun) == ContactState(lost_below_N=3.0)
+
+
+def test_the_mean_is_over_half_a_second_or_over_what_there_is():
+    state, at = ContactState(), 1_000 * MS
+    assert contact_threshold.mean_force(state) is None
+    assert contact_threshold.along(None, AHEAD) == 0.0
+    for n in range(8):  # a reading each 0.1 s: (0, 1, 2), (10, 11, 12), ...
+        state = contact_threshold.add(state, (10.0 * n, 10.0 * n + 1, 10.0 * n + 2), at + 100 * n * MS)
+        if n == 1:
+            assert contact_threshold.mean_force(state) == (0.0, 1.0, 2.0)
+            assert contact_threshold.mean_force(state, 1) is None
+            assert contact_threshold.felt(state, AHEAD) == 0.0, "not yet half a second"
+        if n == 3:
+            assert contact_threshold.mean_force(state) == (10.0, 11.0, 12.0)
+    assert contact_threshold.mean_force(state) == (40.0, 41.0, 42.0)
+    assert contact_threshold.mean_force(state, 1) == (30.0, 31.0, 32.0)
+    assert contact_threshold.felt(state, (0.6, 0.8)) == pytest.approx(0.6 * 40 + 0.8 * 41)
+
+
+def test_the_force_before_a_contact_is_that_before_its_own_half_second():
+    """3, 4, 0 N, half a second each: 3 N before a contact found by the mean of the 4 N, 3.2 N just before the last."""
+    state = window(*[3.0] * 5, *[4.0] * 5)
+    assert contact_threshold.force_before(state, by_mean=True) == pytest.approx(3.0)
+    assert contact_threshold.force_before(window(*[3.0] * 5, 4.0, 9.0), by_mean=False) == pytest.approx(3.2)
+    assert math.isnan(contact_threshold.force_before(window(4.0), by_mean=True))
 
 
 def light(newton):
@@ -150,6 +182,13 @@ def test_the_threshold_falls_only():
     falling = learned(*[10.0] * 3, *[6.0] * 7)
     assert falling == 3.0
     assert learned(*[6.0] * 5, *[10.0] * 20) == 3.0
+
+
+def test_a_sample_is_taken_each_centimetre():
+    state = ContactState()
+    for millimetres in range(1, 102):
+        state = contact_threshold.learn(state, 8.0, millimetres / 1000, 5.0)
+    assert len(state.samples) == 11
 
 
 def test_only_the_first_half_metre_counts():

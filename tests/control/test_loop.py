@@ -7,7 +7,9 @@ import pytest
 
 from control.loop import ControlLoop, Watch
 from robot_io.messages import DeviceHealth, LinkState, SensorWrench, Stamped
-from robot_io.tick import Operator, TickState
+from robot_io.tick import TICK_CDR, Operator, TickState
+from tests.safety.fold_bench import FoldBench
+from tools.replay.difference import difference
 
 
 class Sensor:
@@ -187,3 +189,50 @@ def test_a_launcher_that_is_gone_is_read_no_more(bench):
     bench.loop._on_operator(0)
     bench.loop._on_operator(0)
     assert bench.loop._input(0, 0, 0).operator == Operator.STOP
+
+
+def recorded(bench, *fits):
+    """Let one tick after another end, of which each fits into the ring or not; return the number of states in each."""
+    pushed, outcomes = [], iter(fits)
+
+    def push(_kind, _time_ns, payload):
+        pushed.append(TICK_CDR.decode(payload))
+        return next(outcomes)
+
+    bench.loop._ring.push = push
+    pushing = FoldBench()
+    for _ in fits:
+        pushing.fold()
+        bench.loop._record(pushing.inp, pushing.state, pushing.output)
+        bench.loop._state = pushing.state
+    return pushed
+
+
+def test_the_state_before_a_tick_is_in_the_log_once(bench):
+    first, *others = recorded(bench, True, True, True)
+    assert difference(0, first.before, (TickState(),), None) is None
+    assert [tick.before for tick in others] == [(), ()]
+
+
+def test_behind_records_that_did_not_fit_the_state_is_written_again(bench):
+    """Replay starts from there: the state after the tick that is missing."""
+    ticks = recorded(bench, True, False, False, True, True)
+    assert [len(tick.before) for tick in ticks] == [1, 0, 1, 1, 0]
+    for one, last in ((ticks[2], ticks[1]), (ticks[3], ticks[2])):
+        assert difference(0, one.before, (last.after,), None) is None
+
+
+def test_a_tick_that_failed_holds_the_state_before_it(bench):
+    """Its own record may have been written before it failed, so that nobody knows which state came last."""
+    good = FoldBench()
+    good.fold()
+    bench.loop._fold = lambda state, inp: (state, good.output)
+    bench.loop._base.command = lambda *_, **__: None
+    bench.loop._on_status = lambda *_: 1 / 0
+    pushed = []
+    bench.loop._ring.push = lambda _kind, _time_ns, payload: pushed.append(TICK_CDR.decode(payload)) or True
+    with pytest.raises(ZeroDivisionError):
+        bench.loop._one_tick(good.inp)
+    bench.loop._give_up(good.inp, ZeroDivisionError())
+    assert [len(tick.before) for tick in pushed] == [1, 1]
+    assert [tick.input.host.loop_error for tick in pushed] == [False, True]

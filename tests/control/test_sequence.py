@@ -704,19 +704,6 @@ def test_an_approach_that_was_held_ramps_up_again():
     assert speeds[-1] == pytest.approx(0.05, abs=1e-9)
 
 
-def test_the_message_of_a_tick_holds_all_of_it():
-    from tools.run.tick_core import tick_message
-
-    bench = pushing()
-    before = bench.state
-    bench.fold()
-    message = tick_message(bench.inp, before, bench.state, bench.output)
-    assert (message.input, message.before, message.after, message.output) == (
-        bench.inp, before, bench.state, bench.output,
-    )  # fmt: skip
-    assert (message.crc32_before, message.reserved) == (0, 0)  # the recorder chains it
-
-
 def test_the_fold_is_pure():
     """Same arguments, same result, and the arguments are left alone."""
     bench = pushing()

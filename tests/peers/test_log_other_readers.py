@@ -84,7 +84,7 @@ def log(tmp_path_factory) -> Path:
         )
         faults = ("F60-late",) if n % 100 == 50 else ()
         out = TickOutput(2, faults, WorldTwist(), BodyTwist(), BodyTwist(0.1, 0.0, 0.0), 0.0, 0.0, False, 0)
-        log.record(Kind.CONTROL_TICK, now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, TickState(), TickState(), out)))
+        log.record(Kind.CONTROL_TICK, now_ns, TICK_CDR.encode(ControlTick(0, 0, inp, (TickState(),), TickState(), out)))
         if n % 25 == 24:
             log.flush()
     log.finish({})

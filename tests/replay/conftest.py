@@ -10,7 +10,7 @@ import pytest
 from robot_io.tick import TICK_CDR, ControlTick, Phase
 from tests.host_watch import HostWatch, repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished
-from tests.replay.runs import ticks_in
+from tests.replay.runs import as_logged, ticks_in
 from tools.log.run_log import RunLog
 
 
@@ -53,7 +53,7 @@ def sim_ticks(sim_log) -> list[ControlTick]:
 @pytest.fixture(scope="session")
 def pushing_at(sim_ticks) -> int:
     """Index of a tick in the middle of the push."""
-    pushing = [i for i, tick in enumerate(sim_ticks) if tick.before.control.phase == Phase.PUSH]
+    pushing = [i for i, tick in enumerate(sim_ticks) if tick.before[0].control.phase == Phase.PUSH]
     return pushing[len(pushing) // 2]
 
 
@@ -64,7 +64,7 @@ def write_log(sim_run):
 
     def write(path: Path, ticks: list[ControlTick], facts: dict[str, str] | None = None) -> Path:
         log = RunLog(path, config_text=config, metadata=facts or {}, wall_offset_ns=10**18)
-        for tick in ticks:
+        for tick in as_logged(ticks):
             log.tick(tick.input.now_ns, TICK_CDR.encode(tick), tick)
         log.finish({})
         return path

@@ -11,6 +11,7 @@ from robot_io.cdr.schema import type_from_schema
 from robot_io.cdr.shape import Many, Nested, Shape
 from robot_io.log.channels import Channel
 from robot_io.tick import TICK_CDR, ControlTick
+from tests.replay.runs import as_logged
 from tools.log import run_log
 from tools.log.run_log import RunLog
 
@@ -74,7 +75,7 @@ def write_older(
     with monkeypatch.context() as patch:
         patch.setitem(run_log.BY_TOPIC, "/control/tick", Channel("/control/tick", older))
         log = RunLog(path, config_text=config, metadata=facts, wall_offset_ns=10**18)
-        for tick in ticks:
+        for tick in as_logged(ticks):
             log.tick(tick.input.now_ns, older.encode(as_older(older.shape, tick, more)), tick)
         log.finish({})
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import subprocess
@@ -145,7 +146,7 @@ def with_input(tick: ControlTick, **parts: Any) -> ControlTick:
 
 
 def ticks_in(path: Path) -> list[ControlTick]:
-    """Return the ticks of a log."""
+    """Return the ticks of a log, each with the state before it, so that a log may begin with any."""
     found: list[ControlTick] = []
 
     def look(messages: Messages) -> Messages:
@@ -153,4 +154,13 @@ def ticks_in(path: Path) -> list[ControlTick]:
         return []
 
     rewritten(path, Path(os.devnull), look)
+    for i, tick in enumerate(found):
+        if not tick.before:
+            found[i] = replace(tick, before=(found[i - 1].after,))
     return found
+
+
+def as_logged(ticks: list[ControlTick]) -> list[ControlTick]:
+    """Return the ticks with the state before only where a log holds it: where it is not the end of the one before."""
+    follow = [False, *(not tick.before or tick.before[0] is last.after for last, tick in itertools.pairwise(ticks))]
+    return [replace(tick, before=()) if known else tick for known, tick in zip(follow, ticks, strict=True)]

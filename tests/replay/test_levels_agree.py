@@ -10,7 +10,7 @@ from tests.replay.runs import ticks_in
 
 
 def pushing_force(log) -> float:
-    forces = [tick.after.control.force_world for tick in ticks_in(log) if tick.before.control.phase == Phase.PUSH]
+    forces = [tick.after.control.force_world for tick in ticks_in(log) if tick.before[0].control.phase == Phase.PUSH]
     assert len(forces) > 100
     return statistics.median((x * x + y * y) ** 0.5 for x, y, _ in forces)
 

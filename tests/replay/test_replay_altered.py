@@ -62,10 +62,10 @@ INPUTS = {
     "gate": lambda tick: with_input(tick, host=replace(tick.input.host, gate_alive=False)),
     "loop error": lambda tick: with_input(tick, host=replace(tick.input.host, loop_error=True)),
     "state before": lambda tick: replace(
-        tick, before=replace(tick.before, control=replace(tick.before.control, theta_p=0.5))
+        tick, before=(replace(tick.before[0], control=replace(tick.before[0].control, theta_p=0.5)),)
     ),
     "impossible phase": lambda tick: replace(
-        tick, before=replace(tick.before, control=replace(tick.before.control, phase=77))
+        tick, before=(replace(tick.before[0], control=replace(tick.before[0].control, phase=77)),)
     ),
     "endless number": lambda tick: with_input(tick, base=replace(tick.input.base, pose=Pose2D(math.inf, 0.0, 0.0))),
     "state after": lambda tick: replace(

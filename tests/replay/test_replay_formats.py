@@ -12,10 +12,12 @@ from robot_io.log import log_format
 from robot_io.log.log_format import ChangedTopic, EarlierValue, RenamedField
 from robot_io.log.world_messages import STATE_CDR
 from robot_io.mcap.read import read_log, read_summary
+from robot_io.rig.config import rig_from_toml
 from robot_io.tick import ControlTick
 from tests.replay.older import EditText, as_older, instead, older_type, without, write_older
-from tests.replay.runs import Edit, Messages, changed, replayed, resealed, rewritten
+from tests.replay.runs import Edit, Messages, changed, replayed, resealed, rewritten, with_input
 from tools.cli import main
+from tools.run.tick_core import TickCore
 
 DIFFERS, DAMAGED = 7, 8
 PID, LATERAL = "int64 child_pid", "float64 lateral_m"
@@ -24,7 +26,7 @@ PID, LATERAL = "int64 child_pid", "float64 lateral_m"
 @pytest.fixture(autouse=True)
 def only_the_tables_of_the_test(monkeypatch):
     """The older logs here are made of today's types, so that what really was otherwise in format 1 is not in them."""
-    for table in ("RENAMED_FIELDS", "EARLIER_VALUES", "COMPUTED_VALUES", "CHANGED_TOPICS"):
+    for table in ("RENAMED_FIELDS", "EARLIER_VALUES", "COMPUTED_VALUES", "NOW_OPTIONAL", "CHANGED_TOPICS"):
         monkeypatch.setattr(log_format, table, ())
 
 
@@ -84,6 +86,22 @@ def test_a_changed_input_of_an_older_log_is_found_by_the_fold(older_log, some_ti
 
     log = older_log([harder(some_ticks[0]), *some_ticks[1:]], without(PID))
     assert replayed(capsys, log)[0] == DIFFERS
+
+
+def test_a_count_that_is_told_as_a_measured_value_is_no_difference(older_log, sim_ticks, pushing_at, sim_log, capsys):
+    """A frozen sensor (F06) is told by its number of equal readings, which a log holds as a float."""
+    core = TickCore.of(rig_from_toml(read_summary(sim_log).attachments["config.toml"].decode()))
+    given = sim_ticks[pushing_at : pushing_at + 40]
+    state, reading, frozen = given[0].before[0], given[0].input.ft.readings[-1], []
+    for tick in given:
+        ft = tick.input.ft
+        same = tuple(replace(one, force=reading.force, torque=reading.torque) for one in ft.readings)
+        tick = with_input(tick, ft=replace(ft, readings=same))
+        after, output = core.fold(state, tick.input)
+        frozen.append(replace(tick, before=(state,), after=after, output=output))
+        state = after
+    assert "F06" in frozen[-1].output.faults
+    assert len(verified(capsys, older_log(frozen, without(PID)), 40)) == 1
 
 
 def test_damage_of_an_older_log_is_damage(older_log, some_ticks, tmp_path, capsys):

@@ -41,7 +41,7 @@ def test_every_tick_and_every_state_of_the_world_is_identical(level, request, ca
             "first_difference": None,
         },
         "complete": True,
-        "made_by": told["made_by"] | {"format": 2},
+        "made_by": told["made_by"] | {"format": 3},
         "notes": [],
         "machine_differences": [],
     }

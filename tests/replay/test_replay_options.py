@@ -27,6 +27,21 @@ def test_ticks_that_did_not_fit_into_the_ring_are_a_counted_gap(sim_ticks, pushi
     assert told["first_difference"]["tick"] == altered.input.tick
 
 
+def test_a_gap_behind_which_no_state_is_known_is_a_difference(sim_ticks, pushing_at, write_log, tmp_path, capsys):
+    part = sim_ticks[pushing_at : pushing_at + 20]
+    later = [replace(part[13], before=()), *part[14:]]
+    code, told = replayed(capsys, write_log(tmp_path / "run.mcap", part[:10] + later))
+    assert (code, told["ticks"], told["identical"], told["gaps"]) == (7, 17, 16, 1)
+    assert (told["first_difference"]["tick"], told["first_difference"]["field"]) == (part[13].input.tick, "before")
+
+
+def test_a_log_without_the_state_to_start_from_is_damaged(sim_ticks, pushing_at, write_log, tmp_path, capsys):
+    part = sim_ticks[pushing_at : pushing_at + 3]
+    log = write_log(tmp_path / "run.mcap", [replace(part[0], before=()), *part[1:]])
+    for more in ((), ("--what-if", "control.k_f=0.31")):
+        assert replayed(capsys, log, *more)[0] == 8
+
+
 def test_skipped_periods_are_no_gap(sim_ticks, pushing_at, write_log, tmp_path, capsys):
     a, b = sim_ticks[pushing_at], sim_ticks[pushing_at + 1]
     late = replace(b.input, tick=a.input.tick + 3, host=replace(b.input.host, skipped=2))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from msgspec.structs import replace
 
+from control.sensing import counted
 from robot_io.messages import BaseStatus, BodyTwist, Pose2D
 from robot_io.tick import ControlState, Operator, Phase, TickInput, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, PERIOD_NS, Alter, FoldBench, pushing, with_force, without_contact
@@ -198,7 +199,7 @@ def starting_too_far_on() -> FoldBench:
     """Return a bench that is about to leave the tare, 0.9 m too far on for its 2 m push."""
     bench = FoldBench(("workspace.x_m=[-1.0, 2.0]", "workspace.y_m=[-2.0, 2.0]"))
     bench.pose = Pose2D(0.4, 0.0, 0.0)
-    while bench.state.control.tare.count < bench.core.control.tare_readings:
+    while counted(bench.state.control) < bench.core.control.tare_readings - 1:
         bench.fold()
     return bench
 

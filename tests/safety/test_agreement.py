@@ -6,10 +6,13 @@ The numbers are those of docs/safety.md: a frozen or mirrored pose within 0.15 m
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from robot_io.messages import BodyTwist, Pose2D
-from robot_io.tick import Phase
+from robot_io.messages import BaseRecord, BodyTwist, Pose2D
+from robot_io.tick import MotionMark, Phase
+from safety.checks import agreement_checks
 from tests.safety.fault_scenarios import base, shifted_pose, then
 from tests.safety.fold_bench import FoldBench, without_contact
 from tools.rig import resolve_rig
@@ -163,3 +166,35 @@ def test_two_hundred_normal_pushes_meet_none_of_these():
     for seed in range(200):
         slip = 0.1 * (seed % 11) / 10
         assert quiet(seed, f"world.slip={slip}", "world.floor.patch_strength=0.3")[0] == [], seed
+
+
+OFF = st.floats(-0.03, 0.03)
+WAY = st.floats(-0.4, 0.4)
+
+
+@given(
+    way=st.tuples(WAY, WAY, st.floats(-0.5, 0.5)),
+    off=st.tuples(OFF, OFF, st.floats(-0.1, 0.1)),
+    command_off=st.tuples(OFF, OFF),
+    time_ns=st.integers(0, 6_000_000_000),
+    sent=st.floats(0.0, 0.2),
+)
+def test_what_is_left_out_unseen_is_never_too_far_off(way, off, command_off, time_ns, sent):
+    """A moment that needs no second look would not have been a fault with one, whatever its direction and time."""
+    then = MotionMark(0, 1.0, -2.0, 3.1, 0.5, 0.25, 0.1, 0.4, 0.3)
+    now = MotionMark(
+        time_ns,
+        then.x + way[0] + off[0],
+        then.y + way[1] + off[1],
+        then.yaw + way[2] + off[2],
+        then.way_x + way[0],
+        then.way_y + way[1],
+        then.way_yaw + way[2],
+        then.sent_x + way[0] + command_off[0],
+        then.sent_y + way[1] + command_off[1],
+    )
+    inp = replace(FoldBench().good_input(), base=BaseRecord(sent=BodyTwist(sent, 0.0, 0.0)))
+    if agreement_checks._near_by_pose(then, now):
+        assert agreement_checks._of_pose(then, now, inp) <= 1.0
+    if agreement_checks._near_by_command(then, now):
+        assert agreement_checks._of_command(then, now, inp) <= 1.0

@@ -111,6 +111,20 @@ def test_a_speed_that_is_no_number_is_left_out(bad):
     assert travel.on_speed(bad, 2 * S) == travel
 
 
+def test_a_measured_speed_is_smoothed_over_a_fifth_of_a_second():
+    """20 ms are a tenth of it; after as long as it, or longer, only the newest sample counts."""
+    travel = replace(Travel(), measured_ns=S).on_speed(BodyTwist(0.1, -0.2, 0.0), S + 20 * MS)
+    assert (travel.vx, travel.vy, travel.measured_ns) == (pytest.approx(0.01), pytest.approx(-0.02), S + 20 * MS)
+    for later_ns in (S + 220 * MS, 5 * S):
+        assert travel.on_speed(BodyTwist(0.3, 0.1, 0.0), later_ns).vx == pytest.approx(0.3)
+
+
+def test_a_run_begins_with_nothing_travelled():
+    assert Travel() == Travel(
+        began=False, at_ns=0, sent_m=0.0, measured_m=0.0, moving_ns=0, vx=0.0, vy=0.0, measured_ns=0
+    )
+
+
 def test_time_that_goes_back_counts_nothing():
     travel = Travel().on_time(S, PUSH).on_speed(PUSH, S)
     back = travel.on_time(0, PUSH)

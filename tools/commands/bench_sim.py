@@ -21,7 +21,7 @@ from robot_io.error_report import say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.mcap.read import read_summary
 from robot_io.rig.config import rig_to_toml
-from robot_io.tick import TICK_CDR, ControlTick
+from robot_io.tick import TICK_CDR, ControlTick, TickState
 from tools.kinds import device_names
 from tools.log.tick_topics import TickTopics
 from tools.rig import resolve_rig
@@ -115,8 +115,9 @@ def time_tick_parts(folder: Path) -> dict[str, float]:
         Lockstep(rig, 0, RecordedRun()).run(lambda *_: None)
 
     def fold() -> None:
+        state = TickState()
         for tick in ticks:
-            core.fold(tick.before, tick.input)
+            state, _ = core.fold(state, tick.input)
 
     def encode() -> None:
         for tick in ticks:

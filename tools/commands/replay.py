@@ -138,7 +138,7 @@ def what_if(path: Path, args: argparse.Namespace) -> int:
     for _, _, _, tick in log.messages():
         if tick is None:
             continue
-        state, output = core.fold(tick.before if state is None else state, tick.input)
+        state, output = core.fold(tick.before[0] if state is None else state, tick.input)
         old, new = tick.output.wanted_world, output.wanted_world
         off = math.hypot(old.vx - new.vx, old.vy - new.vy)
         count += 1

@@ -71,6 +71,7 @@ class TickTopics:
         self._offset_ns = wall_offset_ns
         self._names = names
         self._faults: tuple[str, ...] = ()
+        self._mode = 0
         self._arm_packets = 0
         self._pose_seq = 0
         self._diagnosed_ns: int | None = None
@@ -126,7 +127,8 @@ class TickTopics:
         return [message("/tf", time_ns, TFMessage((placed,)))]
 
     def _events(self, tick: ControlTick, header: Header, now_ns: int) -> list[Message]:
-        before, after = tick.before.safety.mode, tick.after.safety.mode
+        before = tick.before[0].safety.mode if tick.before else self._mode
+        after = self._mode = tick.after.safety.mode
         faults, self._faults, known = tick.output.faults, tick.output.faults, self._faults
         if faults == known and before == after:
             return []

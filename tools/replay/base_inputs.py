@@ -19,6 +19,8 @@ from tools.replay.difference import Difference
 from tools.replay.payloads import is_current_type, payload_difference, payloads_equal
 
 TOPICS = ("/base/pose", "/base/odom", "/base/status", "/gate/sent")
+FIRST_FORMAT = 2
+"""Logs before it held the base's messages in another way."""
 MOST_KEPT = 4096
 """Log times per topic for which messages, seen or expected, wait for their counterpart: 40 s at 100 Hz."""
 

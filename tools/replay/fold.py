@@ -12,12 +12,11 @@ from pathlib import Path
 
 import msgspec
 
-from robot_io.log.log_format import LOG_FORMAT
 from robot_io.log.logged_type import LoggedType
 from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.tick import TICK_CDR, ControlTick, TickState
 from tools.log.derivation import WORLD_TOPIC
-from tools.replay.base_inputs import BaseInputsReplay, BaseInputsReplayer
+from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplay, BaseInputsReplayer
 from tools.replay.code_origin import CodeOrigin
 from tools.replay.derived import DerivedReplay, DerivedReplayer
 from tools.replay.difference import Difference, difference
@@ -67,7 +66,8 @@ def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
     # A world with incomplete records cannot be re-run.
     world = None if log.dropped("world") else WorldReplayer(rig, types, tolerance)
     derived = DerivedReplayer(rig, log.wall_offset_ns, log.channels, log.made_by.format, tolerance)
-    comparable = log.ticks.exact and log.made_by.format == LOG_FORMAT and not log.dropped("gate")
+    known = log.made_by.format >= FIRST_FORMAT and log.ticks.holds_all_of("input.base")
+    comparable = known and not log.dropped("gate")
     arrived = BaseInputsReplayer(log.wall_offset_ns, log.channels, tolerance) if comparable else None
     for topic, log_time_ns, payload, tick in log.messages():
         if tick is not None:
@@ -146,8 +146,11 @@ class TickReplayer:
         number = tick.input.tick
         if self._state is None or number != self.last + 1 + tick.input.host.skipped:
             self.gaps += self._state is not None
-            self._state = tick.before
-        found, after = self._compare(tick, payload, self._state)
+            self._state = tick.before[0] if tick.before else None
+        found: Difference | None = Difference(number, "before", "no state", "a state to start from")
+        after = tick.after
+        if self._state is not None:
+            found, after = self._compare(tick, payload, self._state)
         self.count += 1
         self.identical += found is None
         self.first = self.first or found
@@ -159,9 +162,12 @@ class TickReplayer:
         number = tick.input.tick
         try:
             after, output = self._core.fold(before, tick.input)
-            replayed = ControlTick(tick.crc32_before, tick.reserved, tick.input, before, after, output)
-            if self._logged.exact and TICK_CDR.encode(replayed) == payload:
+            kept = (before,) if tick.before else ()
+            replayed = ControlTick(tick.crc32_before, tick.reserved, tick.input, kept, after, output)
+            encoded = TICK_CDR.encode(replayed)
+            if self._logged.exact and encoded == payload:
                 return None, after
+            replayed = TICK_CDR.decode(encoded)  # as a log holds it: a whole number where a float belongs is one
         except Exception as error:  # nothing in a log may crash its replay; the run itself survived this tick
             return Difference(number, "output", "a tick", f"{type(error).__name__}: {error}"), tick.after
         found = difference(number, tick, replayed, self._tolerance, self._logged.missing)

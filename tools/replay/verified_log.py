@@ -161,6 +161,8 @@ class VerifiedLog:
         except LogDamaged as error:
             named = "the first tick" if last < 0 else f"tick {last + 1}"
             raise self._damaged(f"{named} was altered: {error.what}") from None
+        if last < 0 and not tick.before:
+            raise self._damaged("the first tick was altered: it holds no state to start from")
         if self.facts.get(OFFSET_FACT) != str(message.log_time_ns - tick.input.now_ns):
             raise self._damaged(f"tick {tick.input.tick} was altered: its log time does not match its content")
         return tick

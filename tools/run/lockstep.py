@@ -41,7 +41,7 @@ from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
 from tools.run.facts.run_facts import run_facts
 from tools.run.run_state import initial_state
-from tools.run.tick_core import TickCore, tick_message
+from tools.run.tick_core import TickCore
 
 START_NS = NS_PER_S
 """Virtual time of the first tick."""
@@ -92,6 +92,7 @@ class Lockstep:
         self._base_edge = InjectedBase(self._base, self.injection)
         self._core = TickCore.of(rig, in_contact=saved is not None)
         self._state = initial_state(saved)
+        self._recorded = False
         self._gate = GateShell(self._core.safety.envelope, total_bounds(rig), START_NS)
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
         self.notes = RunNotes()
@@ -152,7 +153,8 @@ class Lockstep:
 
     def _finish_tick(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
         self._send(inp.tick, inp.now_ns, output)
-        message = tick_message(inp, self._state, after, output)
+        message = ControlTick(0, 0, inp, () if self._recorded else (self._state,), after, output)
+        self._recorded = True
         self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
         self._state = after
         self.notes.note(inp, after, output)

@@ -9,7 +9,7 @@ from control.settings import Settings
 from control.step import step
 from robot_io.messages import BodyTwist, WorldTwist
 from robot_io.rig.config import RigConfig
-from robot_io.tick import ControlTick, EnvelopeState, Mode, TickInput, TickOutput, TickState
+from robot_io.tick import EnvelopeState, Mode, TickInput, TickOutput, TickState
 from safety import envelope
 from safety.checks.base_checks import trusted_pose
 from safety.settings import SafetySettings
@@ -63,8 +63,3 @@ class TickCore(msgspec.Struct, frozen=True):
             verdict.exit_code,
             verdict.values,
         )
-
-
-def tick_message(inp: TickInput, before: TickState, after: TickState, output: TickOutput) -> ControlTick:
-    """Return the message for `/control/tick`; the recorder chains it."""
-    return ControlTick(0, 0, inp, before, after, output)

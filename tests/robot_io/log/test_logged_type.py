@@ -158,5 +158,6 @@ def test_the_first_format_said_nothing():
     assert format_of({}) == 1
     assert format_of({"format": "1"}) == 1
     assert format_of({"format": "2"}) == 2
-    with pytest.raises(UsageError, match="format 3"):
-        format_of({"format": "3"})
+    assert format_of({"format": "3"}) == 3
+    with pytest.raises(UsageError, match="format 4"):
+        format_of({"format": "4"})

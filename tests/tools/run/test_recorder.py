@@ -72,7 +72,7 @@ def tick_payload(n: int) -> bytes:
     before, after = TickState(), TickState(safety=SafetyState(mode=2 if n == 0 else 0))
     faults = ("F60-late",) if n % 50 == 10 else ()
     out = TickOutput(2, faults, WorldTwist(), BodyTwist(0.2, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0), 0.0, 0.0, False, 0)
-    return TICK_CDR.encode(ControlTick(0, 0, inp, before, after, out))
+    return TICK_CDR.encode(ControlTick(0, 0, inp, (before,), after, out))
 
 
 class Run:
