@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import DashboardServer
 from sim_backend.ur10.modes import RobotMode, SafetyMode
+from sim_backend.ur10.registers import REGISTERS
 from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
 
@@ -100,6 +101,15 @@ class UrFaults:
     def mute_dashboard(self, on: bool = True) -> None:
         """Accept dashboard connections but send nothing."""
         self.dashboard.muted = on
+
+    def take_inputs(self) -> None:
+        """Hold every general-purpose input register, as a fieldbus does."""
+        names = [f"input_{kind}_register_{i}" for kind in ("int", "double") for i in range(REGISTERS)]
+        self.rtde.owners.update(dict.fromkeys(names, self))
+
+    def be_model(self, model: str) -> None:
+        """Call itself another robot."""
+        self.dashboard.dashboard.model = model
 
     def freeze(self, on: bool = True) -> None:
         """Freeze the controller as SIGSTOP does: the kernel accepts connections, nothing is read or answered."""

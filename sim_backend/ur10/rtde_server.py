@@ -219,7 +219,7 @@ class RtdeServer(TcpServer):
     def __init__(self, loop: EventLoop, host: str, robot: UrController, requests: RequestLog) -> None:
         self.robot = robot
         self.requests = requests
-        self.owners: dict[str, RtdeClient] = {}
+        self.owners: dict[str, object] = {}
         self.muted = False
         self.counters = {"data_sent": 0, "data_dropped": 0}
         self.rtde_clients: list[RtdeClient] = []

@@ -60,7 +60,7 @@ def _version(rows: Rows, host: str, version: tuple[int, int, int, int], words: D
     try:
         check_version(host, version)
     except DeviceProtocolError as error:
-        rows.bad("version", "failed", error.what, error.do, number)
+        rows.error("version", error)
     else:
         rows.ok("version", told, number)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from robot_io.errors import DeviceError, PushError
+from robot_io.errors import DeviceError
 from robot_io.ridgeback.driver import FIRST_MESSAGE_TIMEOUT_S, FRESH_NS, LINK_STALE_NS
 from robot_io.ridgeback.look import Heard, RidgebackLook, commands_of_others
 from robot_io.ridgeback.sole_command import in_words
@@ -28,7 +28,7 @@ def base_checks(rig: RigConfig) -> list[Check]:
     base = rig.base
     try:
         look = RidgebackLook(base.url, base.topics, base.pose_source, rig.frames.base_from_marker)
-    except PushError as error:
+    except DeviceError as error:
         rows.error("handshake", error)
         return rows.all("the bridge was not reached")
     try:

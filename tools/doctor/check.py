@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 import msgspec
+from msgspec.structs import asdict
 
 from robot_io.errors import PushError
 
@@ -36,6 +37,13 @@ class Check(msgspec.Struct, frozen=True):
     unit: str = ""
     evidence: str = ""
     fix: str = ""
+    where: str = ""
+    """What the evidence is of, where the row's name does not say it; told in front of it."""
+
+    @property
+    def told(self) -> str:
+        """The evidence, and what it is of."""
+        return f"{self.where}: {self.evidence}" if self.where else self.evidence
 
 
 class Rows:
@@ -66,8 +74,7 @@ class Rows:
 
     def error(self, name: str, error: PushError) -> None:
         """Note a failure as an error says it."""
-        where = f" ({error.where})" if error.where and error.where not in error.what else ""
-        self.bad(name, "failed", f"{error.what}{where}", error.do)
+        self._note(Check(f"{self._of}.{name}", "failed", evidence=error.what, fix=error.do, where=error.where))
 
     def skip(self, name: str, why: str) -> None:
         """Note that a check was not made."""
@@ -91,7 +98,7 @@ def report(rig_name: str, checks: Sequence[Check]) -> dict[str, Any]:
         "rig": rig_name,
         "ok": counts["failed"] == 0,
         "counts": counts,
-        "checks": msgspec.to_builtins(list(checks)),
+        "checks": [_row(check) for check in checks],
     }
 
 
@@ -101,7 +108,7 @@ def lines(checks: Iterable[Check]) -> list[str]:
     width = max((len(check.check) for check in checks), default=0)
     told = []
     for check in checks:
-        told.append(f"{check.result:<8} {check.check:<{width}}  {check.evidence}".rstrip())
+        told.append(f"{check.result:<8} {check.check:<{width}}  {check.told}".rstrip())
         if check.fix:
             told.append(f"{'':<8} {'':<{width}}  -> {check.fix}")
     return told
@@ -111,6 +118,12 @@ def summary_line(checks: Sequence[Check]) -> str:
     """Return how many checks ended how."""
     counts = {result: sum(check.result == result for check in checks) for result in RESULTS}
     return ", ".join(f"{count} {result}" for result, count in counts.items() if count)
+
+
+def _row(check: Check) -> dict[str, Any]:
+    row = asdict(check)
+    del row["where"]
+    return row | {"evidence": check.told}
 
 
 def _finite(value: float | str | None) -> float | str | None:

@@ -6,20 +6,29 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 from msgspec.structs import replace
 
 from robot_io.clock import monotonic_ns
-from robot_io.errors import EnvironmentFault, PushError
+from robot_io.errors import ConfigError, EnvironmentFault, PushError
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import die_with_parent, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.spawn import spawn
 from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import RigConfig, rig_from_toml, rig_to_toml
+from robot_io.rig.fault_words import WHERE
+from sim_backend.ft300.emulator import Ft300Emulator
+from sim_backend.injection.wire_arm import spoil_arm
+from sim_backend.injection.wire_base import spoil_base
+from sim_backend.injection.wire_sensor import spoil_sensor
+from sim_backend.injection.wire_words import parse_wire_fault
+from sim_backend.ridgeback.emulator import RosbridgeEmulator
+from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.world.world import World
-from tools.rig import devices_at
+from tools.kinds import is_shipped
+from tools.rig import devices_at, kinds_of
 from tools.run.emulators import Emulator, address_of, open_emulator
 
 READY_WITHIN_S = 20.0
@@ -44,6 +53,7 @@ def emulators(rig: RigConfig, kind_folder: str, faults: Sequence[str]) -> Iterat
 
     faults: what is wrong with them, in words. Raises PushError where they cannot be served.
     """
+    check_faults(rig, faults)
     devices = tuple(devices_at(rig, "emulated"))
     if not devices:
         yield rig
@@ -73,6 +83,31 @@ def with_addresses(rig: RigConfig, addresses: dict[str, str]) -> RigConfig:
     return rig
 
 
+def spoil(loop: EventLoop, opened: Mapping[str, Emulator], faults: Sequence[str], rig: RigConfig) -> None:
+    """Let the emulators do wrong what `faults` say."""
+    words = [parse_wire_fault(text) for text in faults]
+    for device, emulator in opened.items():
+        mine = [fault for fault in words if fault.device.partition(".")[0] == device]
+        if isinstance(emulator, Ft300Emulator):
+            spoil_sensor(emulator, mine, rig)
+        elif isinstance(emulator, UrEmulator):
+            spoil_arm(emulator, mine)
+        elif isinstance(emulator, RosbridgeEmulator):
+            spoil_base(loop, emulator, mine, rig)
+
+
+def check_faults(rig: RigConfig, faults: Sequence[str]) -> None:
+    """Raise ConfigError for a fault that cannot be read, or that no emulated device of the rig can do."""
+    for text in faults:
+        device = parse_wire_fault(text).device.partition(".")[0]
+        if device not in devices_at(rig, "emulated") or not is_shipped(device, kinds_of(rig)[device]):
+            raise ConfigError(
+                f"`{text}`: {device} is not emulated by this program in rig {rig.name!r}",
+                where=WHERE,
+                do="Use the rig `emulated`",
+            )
+
+
 def main() -> int:
     """Serve until SIGTERM; return the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -90,8 +125,9 @@ def main() -> int:
     except PushError as error:
         status.error(error)
         return error.exit_code
-    try_realtime(PRIORITY)
     addresses = {device: address_of(emulator) for device, emulator in opened.items()}
+    spoil(loop, opened, job.faults, rig)
+    try_realtime(PRIORITY)
     status.say("ready", addresses=addresses)
     loop.run()  # SIGTERM ends the process: its ports and sockets go with it
     return 0

@@ -17,21 +17,30 @@ Held = Mapping[str, str]
 """Who holds a device, in words, for each device that is held."""
 
 
-def examine(rig: RigConfig, kind_folder: str, *, held: Held, faults: Sequence[str] = ()) -> list[Check]:
+def examine(
+    rig: RigConfig, kind_folder: str, *, held: Held, faults: Sequence[str] = (), real_only: bool = False
+) -> list[Check]:
     """Return every row, in order; about 10 s for a rig whose devices answer. Nothing moves.
 
-    Devices at level emulated are served meanwhile, with `faults`. Raises PushError where they cannot be served.
+    Devices at level emulated are served meanwhile, with `faults`; with `real_only` they are skipped. Raises
+    PushError where they cannot be served.
     """
-    with emulators(rig, kind_folder, faults) as served:
-        checks = [check for device in DEVICES for check in _of_device(served, device, held)]
+    if real_only:
+        checks = [check for device in DEVICES for check in device_checks(rig, device, held)]
+    else:
+        with emulators(rig, kind_folder, faults) as served:
+            checks = [check for device in DEVICES for check in device_checks(served, device, held)]
     return [*checks, *host_checks(rig), *rig_checks(rig)]
 
 
-def _of_device(rig: RigConfig, device: str, held: Held) -> list[Check]:
+def device_checks(rig: RigConfig, device: str, held: Held) -> list[Check]:
+    """Return the rows of ft, arm or base, whose address is in the rig."""
     level = {"ft": rig.ft.level, "arm": rig.arm.level, "base": rig.base.level}[device]
     kind = kinds_of(rig)[device]
     if level == "sim":
         return _skipped(device, "level sim has no devices")
+    if not {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}[device] and level == "emulated":
+        return _skipped(device, "emulated, and not served yet")
     if device in held:
         return _skipped(device, f"in use by another run ({held[device]})")
     if not is_shipped(device, kind):

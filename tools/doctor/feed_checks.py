@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 
@@ -20,6 +21,8 @@ from safety.checks.base_checks import (
 )
 from tools.doctor.check import Result, Rows
 
+PAUSES = 2
+"""One pause may be this machine's own."""
 PUBLISHER_FIX = "Check that its publisher runs (motion capture: is the base seen?) and its name in the rig file"
 WrongTypes = Mapping[str, tuple[str, str] | None]
 
@@ -60,6 +63,12 @@ def _rate_hz(heard: Heard, kind: type) -> float:
     return max(len(stamps) - 1, 1) / span_s if span_s > 0.0 else 0.0
 
 
+def _gaps(heard: Heard, kind: type, longer_ns: float) -> int:
+    """Return how many pauses between two messages were longer than so."""
+    stamps = [sample.received_ns for sample in heard.samples if isinstance(sample.value, kind)]
+    return sum(b - a > longer_ns for a, b in itertools.pairwise(stamps))
+
+
 def _paced(rate_hz: float, slow_ns: float, stop_ns: float) -> Result:
     period_ns = 1e9 / rate_hz
     return "failed" if period_ns > stop_ns else "warning" if period_ns > slow_ns else "ok"
@@ -84,6 +93,9 @@ def _pose(rows: Rows, rig: RigConfig, heard: Heard) -> None:
     unusable = [flaw for flaw in flawed if flaw not in frames]
     told = f"{len(poses)} poses at {rate_hz:.1f} Hz"
     result = _paced(rate_hz, slow_ns, stop_ns)
+    if gaps := _gaps(heard, BasePose, stop_ns):
+        told += f", {gaps} pauses longer than {stop_ns / 1e6:.0f} ms"
+        result = "failed" if gaps >= PAUSES else result
     if unusable:
         told = f"{len(unusable)} of {len(poses)} poses cannot be used: {unusable[0]}"
         rows.bad("pose", "failed", told, PUBLISHER_FIX, rate_hz, least_hz, "Hz")

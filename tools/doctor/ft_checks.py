@@ -10,7 +10,7 @@ from pathlib import Path
 from msgspec.structs import astuple
 
 from control.tare import AXES, BIAS_SHARE, DEAD_AT_MOST, SMALLEST_COUNT, UNITS, add, judge
-from robot_io.errors import DeviceError, DeviceUnreachable, PushError
+from robot_io.errors import DeviceError, DeviceUnreachable
 from robot_io.ft300.modbus import POWER_CYCLE
 from robot_io.ft300.preflight import Ft300Preflight, Heard, Polled, latency_timer_ms
 from robot_io.ft300.serial_link import UDEV_RULE
@@ -27,6 +27,7 @@ TIMER_MS = 1.0
 """What the driver asks an adapter for."""
 MEASURED_MS = 4.0
 """Arrivals further apart than this are no timer of 1 ms, even on a busy machine."""
+FIND_FIX = "Plug the adapter in: `push doctor --find` lists those there are"
 ECHO_FIX = "Turn off the echo of the RS-485 adapter (its receiver must be off while it sends)"
 TIMER_FIX = f"As root add this udev rule and replug: {UDEV_RULE}"
 
@@ -39,8 +40,8 @@ def ft_checks(rig: RigConfig) -> list[Check]:
         return rows.all("its port cannot be used")
     try:
         preflight = Ft300Preflight(port)
-    except PushError as error:
-        _refused_port(rows, port, error)
+    except DeviceError as error:
+        _refused_port(rows, error)
         return rows.all("its port cannot be opened")
     with preflight:
         _others_on(rows, port)
@@ -53,20 +54,19 @@ def ft_checks(rig: RigConfig) -> list[Check]:
 
 def _port_is_there(rows: Rows, port: str) -> bool:
     """Judge port and permission without opening anything."""
-    if is_tcp_address(port):
+    if "://" in port:
         rows.skip("permission", "a serial server is reached over the network")
         return True
-    path = Path(port)
+    path, where = Path(port), f"ft300 {port}"
     try:
         is_device = stat.S_ISCHR(path.stat().st_mode)
     except OSError as error:
-        what = "there is no such port" if error.errno == errno.ENOENT else f"it cannot be looked at ({error.strerror})"
-        rows.bad(
-            "port", "failed", f"{what} ({port})", "Plug the adapter in; `push doctor --find` lists those there are"
-        )
+        missing = error.errno == errno.ENOENT
+        what = "there is no such port" if missing else f"it cannot be looked at ({error.strerror})"
+        rows.error("port", DeviceUnreachable(what, where=where, do=FIND_FIX))
         return False
     if not is_device:
-        rows.bad("port", "failed", f"{port} is no device", "Name the adapter by /dev/serial/by-id")
+        rows.error("port", DeviceUnreachable("this is no device", where=where, do=FIND_FIX))
         return False
     real = os.path.realpath(port)
     rows.ok("port", port if real == port else f"{port} is {real}")
@@ -80,7 +80,7 @@ def _port_is_there(rows: Rows, port: str) -> bool:
     return True
 
 
-def _refused_port(rows: Rows, port: str, error: PushError) -> None:
+def _refused_port(rows: Rows, error: DeviceError) -> None:
     cause = error.__cause__
     busy = isinstance(cause, OSError) and cause.errno in (errno.EAGAIN, errno.EBUSY)
     rows.error("lock" if busy else "port", error)
