@@ -149,12 +149,13 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
 
 def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
     """Look at the real devices, and ask before a real robot moves. Raises DeviceError and OperatorStop."""
-    from tools.doctor.before_run import ask_once, look_before_run
+    from tools.doctor.before_run import look_before_run
+    from tools.doctor.consent import ask_once
 
     look_before_run(rig, folder_of(args.rig))
     tell_bounds(rig)
     if not args.yes:
-        ask_once(rig)
+        ask_once(rig, "Push now?")
 
 
 def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:

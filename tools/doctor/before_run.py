@@ -1,15 +1,15 @@
-"""What `push run` does before a real robot moves: doctor first, then one question on a terminal."""
+"""What `push run` does before a real robot moves: it looks with doctor, and refuses where a check failed."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
 from robot_io.error_report import tell
-from robot_io.errors import DeviceError, OperatorStop
+from robot_io.errors import DeviceError
 from robot_io.rig.config import RigConfig
 from tools.doctor.check import Check, lines, summary_line
-from tools.doctor.examine import examine
+from tools.doctor.examine import looked_at
+from tools.doctor.prove import proof_row
 from tools.kinds import name_of
 from tools.rig import kinds_of
 
@@ -20,7 +20,9 @@ def look_before_run(rig: RigConfig, kind_folder: str) -> list[Check]:
     Raises DeviceError where a check failed.
     """
     tell("looking at the devices; nothing moves yet")
-    checks = examine(rig, kind_folder, held={}, real_only=True)
+    checks = list(looked_at(rig, kind_folder, held={}, real_only=True))
+    if rig.base.level == "hardware":
+        checks.append(proof_row(rig))
     for line in lines(check for check in checks if check.result in ("failed", "warning")):
         tell(line)
     tell(f"doctor: {summary_line(checks)}")
@@ -38,19 +40,6 @@ def refusal(rig: RigConfig, checks: Sequence[Check]) -> DeviceError | None:
         return DeviceError(failed[0].evidence, where=_where(rig, failed[0]), do=failed[0].fix)
     what = "; ".join(f"{_where(rig, check)}: {check.evidence}" for check in failed)
     return DeviceError(what, do="; ".join(f"{_name(rig, check)}: {check.fix}" for check in failed if check.fix))
-
-
-def ask_once(rig: RigConfig) -> None:
-    """Ask on the terminal whether to move a real robot; nothing is asked where none moves, or stdin is no terminal.
-
-    Raises OperatorStop unless the answer is yes.
-    """
-    moves = rig.base.level == "hardware" or (rig.arm.level == "hardware" and rig.arm.hold == "servo")
-    if not moves or sys.stdin is None or not sys.stdin.isatty():
-        return
-    print("Is the floor clear, and the e-stop in a hand? Push now? [y/N] ", end="", file=sys.stderr, flush=True)
-    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise OperatorStop("not started: the question was not answered with yes", where="push run")
 
 
 def _name(rig: RigConfig, check: Check) -> str:

@@ -25,6 +25,7 @@ HOST = ("scheduling", "limits", "disk", "memory", "suspend", "clock")
 RIG = ("workspace", "corridor", "stopping-distance", "gains", "calibration-age")
 NAMES = {"ft": FT, "arm": ARM, "base": BASE, "host": HOST, "rig": RIG}
 """Every check, by what it looks at, in the order in which it is told."""
+WIDTH = max(len(f"{of}.{name}") for of, names in NAMES.items() for name in names)
 
 
 class Check(msgspec.Struct, frozen=True):
@@ -86,6 +87,10 @@ class Rows:
             self._found.get(name) or Check(f"{self._of}.{name}", "skipped", evidence=why) for name in NAMES[self._of]
         ]
 
+    def of(self, name: str) -> Check:
+        """Return one row that was found."""
+        return self._found[name]
+
     def _note(self, check: Check) -> None:
         self._found[check.check.partition(".")[2]] = check
 
@@ -104,9 +109,7 @@ def report(rig_name: str, checks: Sequence[Check]) -> dict[str, Any]:
 
 def lines(checks: Iterable[Check]) -> list[str]:
     """Return the rows for people: aligned, with the fix below each that needs one."""
-    checks = list(checks)
-    width = max((len(check.check) for check in checks), default=0)
-    told = []
+    told, width = [], WIDTH
     for check in checks:
         told.append(f"{check.result:<8} {check.check:<{width}}  {check.told}".rstrip())
         if check.fix:

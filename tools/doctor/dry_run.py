@@ -8,7 +8,7 @@ from robot_io.error_report import say_json, tell
 from robot_io.errors import DeviceError
 from robot_io.rig.config import RigConfig
 from tools.doctor.check import NAMES, lines, report, summary_line
-from tools.doctor.examine import examine
+from tools.doctor.examine import looked_at
 from tools.places.device_locks import FreeDevices
 from tools.rig import devices_at
 from tools.run.facts.outlook import outlook, tell_bounds, tell_levels
@@ -29,7 +29,7 @@ def dry_run(rig: RigConfig, *, as_json: bool) -> int:
 def check_only(rig: RigConfig, kind_folder: str, *, as_json: bool) -> int:
     """Look at everything and tell what would run; return 0 without failed checks, else 4."""
     with FreeDevices(rig) as free:
-        checks = examine(rig, kind_folder, held=free.held)
+        checks = list(looked_at(rig, kind_folder, held=free.held))
     told = report(rig.name, checks)
     for line in lines(checks):
         tell(line)

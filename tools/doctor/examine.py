@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from robot_io.rig.config import RigConfig
 from tools.doctor.check import NAMES, Check
@@ -17,20 +18,40 @@ Held = Mapping[str, str]
 """Who holds a device, in words, for each device that is held."""
 
 
-def examine(
-    rig: RigConfig, kind_folder: str, *, held: Held, faults: Sequence[str] = (), real_only: bool = False
-) -> list[Check]:
-    """Return every row, in order; about 10 s for a rig whose devices answer. Nothing moves.
+def looked_at(
+    rig: RigConfig,
+    kind_folder: str,
+    *,
+    held: Held,
+    faults: Sequence[str] = (),
+    real_only: bool = False,
+    prove: bool = False,
+) -> Iterator[Check]:
+    """Give every row as it is found; about 10 s for a rig whose devices answer. Nothing moves.
 
-    Devices at level emulated are served meanwhile, with `faults`; with `real_only` they are skipped. Raises
-    PushError where they cannot be served.
+    Devices at level emulated are served meanwhile, with `faults`; with `real_only` they are skipped.
+    prove: the base is moved, where all that was seen of it is well. Raises PushError where they cannot be served.
     """
-    if real_only:
-        checks = [check for device in DEVICES for check in device_checks(rig, device, held)]
-    else:
-        with emulators(rig, kind_folder, faults) as served:
-            checks = [check for device in DEVICES for check in device_checks(served, device, held)]
-    return [*checks, *host_checks(rig), *rig_checks(rig)]
+    with contextlib.nullcontext(rig) if real_only else emulators(rig, kind_folder, faults) as served:
+        for device in DEVICES:
+            checks = device_checks(served, device, held)
+            yield from checks
+        if prove:
+            yield _proof(served, kind_folder, checks)
+    yield from host_checks(rig)
+    yield from rig_checks(rig)
+
+
+def _proof(rig: RigConfig, kind_folder: str, base: Sequence[Check]) -> Check:
+    """Prove the base's timeout, unless something is wrong with it or nobody looked."""
+    from tools.doctor.consent import ask_once
+    from tools.doctor.prove import prove_base_timeout
+
+    results = {check.result for check in base}
+    if "failed" in results or results == {"skipped"}:
+        return Check("base.timeout", "skipped", evidence="the base is not in order, so it was not moved")
+    ask_once(rig, "Drive 2 cm now?")
+    return prove_base_timeout(rig, kind_folder)
 
 
 def device_checks(rig: RigConfig, device: str, held: Held) -> list[Check]:

@@ -87,7 +87,8 @@ def test_on_a_terminal_it_asks_once_and_no_is_no(state, tmp_path, json):
     assert len(re.findall(QUESTION, ended.err)) == 1
     before = ended.err[: re.search(QUESTION, ended.err).start()]
     assert "stopping distance at 0.1 m/s" in before
-    assert re.search(r"^warning +rig\.calibration-age", before, re.MULTILINE)
+    for name in ("rig.calibration-age", "base.timeout"):
+        assert re.search(rf"^warning +{re.escape(name)}", before, re.MULTILINE)
     assert not out.exists()
 
 

@@ -59,7 +59,7 @@ def test_no_row_has_a_number_that_json_lacks():
 
 def test_people_read_aligned_rows_with_the_fix_below():
     told = lines(some_checks())
-    assert told[0] == "ok       ft.port           /dev/ttyUSB0"
-    assert told[1] == "warning  ft.latency-timer  the timer is 16 ms"
-    assert told[2] == "                           -> Add a rule"
+    assert told[0] == "ok       ft.port                /dev/ttyUSB0"
+    assert told[1] == "warning  ft.latency-timer       the timer is 16 ms"
+    assert told[2] == "                                -> Add a rule"
     assert summary_line(some_checks()) == "1 ok, 1 warning, 1 failed, 1 skipped"
