@@ -14,7 +14,7 @@ from tools.replay.code_origin import compare_code
 
 USAGE, DIFFERS, DAMAGED = 2, 7, 8
 THEN, NOW = "1" * 40, "2" * 40
-CLEAN = {"format": "2", "program": "single-point-push 0.1.0", "commit": NOW, "dirty": "False"}
+CLEAN = {"format": "3", "program": "single-point-push 0.1.0", "commit": NOW, "dirty": "False"}
 
 Metadata = Callable[[str, dict[str, str]], dict[str, str]]
 
@@ -71,7 +71,7 @@ def test_identical_ticks_verify_with_a_note_of_the_code(name, sim_log, tmp_path,
     code, as_json = replayed(capsys, log)
     assert code == 0
     assert as_json["made_by"] == {
-        "format": 2,
+        "format": 3,
         "commit": changes["commit"] or "",
         "dirty": changes["dirty"] == "True",
         "other": bool(words),
@@ -153,16 +153,16 @@ def test_a_config_that_only_other_code_could_use_is_no_damage(sim_log, tmp_path,
 
 
 def test_a_later_format_is_refused_in_true_words_and_still_looked_into(sim_ticks, write_log, tmp_path, capsys):
-    said = {"format": "3", "program": "single-point-push 0.9"}
+    said = {"format": "4", "program": "single-point-push 0.9"}
     log = write_log(tmp_path / "run.mcap", sim_ticks[:5], said)
     for command in (["replay", str(log)], ["report", str(log), "--out", str(tmp_path)]):
         assert main(command) == USAGE
         told_words = capsys.readouterr().err
-        assert "format 3" in told_words
+        assert "format 4" in told_words
         assert "up to 2" in told_words
         assert "single-point-push 0.9" in told_words
     assert main(["log", "info", str(log)]) == 0
-    assert "format = 3" in capsys.readouterr().out
+    assert "format = 4" in capsys.readouterr().out
     assert main(["log", "cat", str(log), "--topics", "/loop/timing"]) == 0
 
 
@@ -175,7 +175,7 @@ def test_a_format_that_is_no_number_is_damage(said, sim_log, tmp_path, capsys):
 
 
 def test_two_installations_without_a_checkout_are_told_apart_by_their_version():
-    installed = {"program": "single-point-push 0.1.0", "format": "2"}
+    installed = {"program": "single-point-push 0.1.0", "format": "3"}
     assert not compare_code(installed, installed, 2).other
     assert compare_code({**installed, "program": "single-point-push 0.2.0"}, installed, 2).other
     assert compare_code({"program": "single-point-push 0.1.0"}, installed, 1).other
