@@ -8,10 +8,11 @@ import msgspec
 
 from robot_io.error_report import ignoring_output_errors, say_json
 from robot_io.errors import DeviceError, UsageError
+from robot_io.ft300.adapters import adapters
 from robot_io.rig.config import RigConfig
 from tools.doctor.check import SCHEMA, Check, lines, report, summary_line
 from tools.doctor.examine import looked_at
-from tools.doctor.find import adapter_lines, adapters
+from tools.doctor.find import adapter_lines
 from tools.places.device_locks import FreeDevices
 from tools.rig import folder_of, resolve_rig
 

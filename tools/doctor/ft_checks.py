@@ -9,7 +9,7 @@ from pathlib import Path
 
 from msgspec.structs import astuple
 
-from control.tare import AXES, BIAS_SHARE, DEAD_AT_MOST, SMALLEST_COUNT, UNITS, add, judge
+from control.tare import AXES, BIAS_SHARE, NOISE_FACTOR, SMALLEST_COUNT, UNITS, add, judge
 from robot_io.errors import DeviceError, DeviceUnreachable
 from robot_io.ft300.modbus import POWER_CYCLE
 from robot_io.ft300.preflight import Ft300Preflight, Heard, Polled, latency_timer_ms
@@ -205,13 +205,14 @@ def _readings(rows: Rows, rig: RigConfig, readings: tuple[SensorWrench, ...]) ->
         sums = add(sums, astuple(reading), len(readings), facts.resolution)
     unlimited = (float("inf"),) * 6
     judged = judge(sums, rig.ft.noise, unlimited, facts.resolution, rig.scatters)
-    worst = max(range(6), key=lambda i: judged.tare.sd[i] / rig.ft.noise[i] if rig.ft.noise[i] else 0.0)
-    sd = judged.tare.sd[worst]
-    told = f"{AXES[worst]} scatters by {sd:.3g} {UNITS[worst]} over {len(readings)} readings"
+    limits = [NOISE_FACTOR * max(noise, step / 2) for noise, step in zip(rig.ft.noise, facts.resolution, strict=True)]
+    worst = max(range(6), key=lambda i: judged.tare.sd[i] / limits[i])
+    sd, limit, unit = judged.tare.sd[worst], limits[worst], UNITS[worst]
     if judged.what:
-        rows.bad("noise", "failed", judged.what, judged.do, sd, rig.ft.noise[worst], UNITS[worst])
+        rows.bad("noise", "failed", judged.what, judged.do, sd, limit, unit)
     else:
-        rows.ok("noise", f"{told}; more than {DEAD_AT_MOST} distinct values on every axis", sd, None, UNITS[worst])
+        told = f"{AXES[worst]} scatters by {sd:.3g} {unit} over {len(readings)} readings, steadily"
+        rows.ok("noise", told, sd, limit, unit)
     shares = [abs(value) / most for value, most in zip(judged.tare.bias, facts.range, strict=True)]
     axis = max(range(6), key=shares.__getitem__)
     value, limit, unit = judged.tare.bias[axis], BIAS_SHARE * facts.range[axis], UNITS[axis]

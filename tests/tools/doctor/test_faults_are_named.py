@@ -97,8 +97,14 @@ NOT_AT_REST = {
 }  # fmt: skip
 
 
+QUICK = {"arm.silent", "arm.version=5.11", "arm.protective-stop at 0 s", "arm.turned", "arm.inputs-taken"}
+
+
 def table(rows):
-    return [pytest.param(*row, id="+".join(row[0])) for row in rows]
+    """Return the rows as parameters; all but the quickest few are long."""
+    return [
+        pytest.param(*row, id="+".join(row[0]), marks=() if row[0][0] in QUICK else pytest.mark.long) for row in rows
+    ]
 
 
 @functools.cache
@@ -121,13 +127,11 @@ def test_a_fault_of_the_arm_is_named(faults, check, result):
     named("arm", faults, check, result)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("faults", "check", "result"), table(SENSOR))
 def test_a_fault_of_the_sensor_is_named(faults, check, result):
     named("ft", faults, check, result)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("faults", "check", "result"), table(BASE))
 def test_a_fault_of_the_base_is_named(faults, check, result):
     named("base", faults, check, result)
