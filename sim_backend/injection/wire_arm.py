@@ -37,6 +37,7 @@ _DEEDS: dict[str, Callable[[UrEmulator, tuple[float, ...]], None]] = {
     "lost": lambda arm, _: arm.close(),
     "off": lambda arm, _: arm.mute(),
     "dashboard-silent": lambda arm, _: arm.mute_dashboard(),
+    "truncated": lambda arm, value: arm.truncate_all_data(round(value[0])),
     "version": _version,
     "other-model": lambda arm, _: arm.be_model("UR5"),
     "protective-stop": lambda arm, _: arm.protective_stop(),

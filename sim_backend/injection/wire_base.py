@@ -16,6 +16,7 @@ from sim_backend.ridgeback.faults import BridgeFaults
 from sim_backend.ridgeback.ros_graph import Message
 
 FOR_GOOD_S = 1e6
+OTHER_TYPES = {"command-type": "geometry_msgs/TwistStamped", "pose-type": "geometry_msgs/PoseStamped"}
 Change = Callable[[Message], Message | None]
 
 
@@ -25,7 +26,10 @@ def spoil_base(loop: EventLoop, emulator: RosbridgeEmulator, faults: Sequence[Wi
     changes: dict[str, list[Change]] = {}
     for fault in faults:
         kind = (fault.device, fault.kind)
-        if kind in _DEEDS:
+        if fault.kind in OTHER_TYPES:
+            topic = rig.base.topics.command if fault.kind == "command-type" else _topic(rig, "base.pose")
+            bridge.topic_type(f"/{topic.lstrip('/')}", OTHER_TYPES[fault.kind])
+        elif kind in _DEEDS:
             _DEEDS[kind](bridge, fault.value)
         else:
             changes.setdefault(_topic(rig, fault.device), []).append(_change(fault))
@@ -37,7 +41,6 @@ _DEEDS: dict[tuple[str, str], Callable[[BridgeFaults, tuple[float, ...]], None]]
     ("base", "silent"): lambda bridge, _: bridge.freeze(FOR_GOOD_S),
     ("base", "lag"): lambda bridge, value: bridge.lag(value[0]),
     ("base", "no-rosapi"): lambda bridge, _: bridge.no_rosapi(),
-    ("base", "command-type"): lambda bridge, _: bridge.command_type("geometry_msgs/TwistStamped"),
     ("base", "no-listener"): lambda bridge, _: bridge.subscriber_missing(),
     ("base", "second-publisher"): lambda bridge, _: bridge.other_publisher(),
     ("base", "second-client"): lambda bridge, _: bridge.other_client(),

@@ -108,9 +108,9 @@ class BridgeFaults:
         filled = graph.types.filled("geometry_msgs/Twist", message)
         self._timers.append(self._loop.call_every(_JOYSTICK_PERIOD_NS, lambda _: graph.publish(topic, filled)))
 
-    def command_type(self, type_name: str) -> None:
-        """Let the command topic carry another type."""
-        self._command().type_name = type_name
+    def topic_type(self, topic: str, type_name: str) -> None:
+        """Let a topic carry another type."""
+        self._emulator.graph.topics[topic].type_name = type_name
 
     def no_rosapi(self) -> None:
         """Run the bridge without rosapi, for clients that come later."""

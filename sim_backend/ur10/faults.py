@@ -126,6 +126,10 @@ class UrFaults:
         for client in self.rtde.rtde_clients:
             client.cut_frame_to = values_bytes
 
+    def truncate_all_data(self, values_bytes: int) -> None:
+        """Cut the values of every data frame from now on."""
+        self.rtde.cut_frames_to = values_bytes
+
     def send_garbage(self, data_hex: str = "00000000ffff55") -> None:
         """Send raw bytes (hex) in place of a frame."""
         for client in self.rtde.rtde_clients:

@@ -88,7 +88,11 @@ def _refused_port(rows: Rows, error: DeviceError) -> None:
 
 def _others_on(rows: Rows, port: str) -> None:
     """Judge the lock, which is ours now: a program that takes none may still read bytes away."""
-    others = [] if is_tcp_address(port) else openers(os.path.realpath(port))
+    if is_tcp_address(port):
+        rows.ok("port", f"{port} accepts connections")
+        rows.skip("lock", "a serial server has its own")
+        return
+    others = openers(os.path.realpath(port))
     if others:
         rows.bad(
             "lock", "failed", f"open elsewhere, too: {', '.join(others)}",

@@ -1,5 +1,7 @@
 """What doctor sends: nothing that starts, moves, writes or publishes. Judged at the devices' end."""
 
+import threading
+
 import pytest
 
 from robot_io.rig.topics import TopicsConfig
@@ -26,6 +28,16 @@ def test_the_sensor_is_never_told_to_stream(streaming):
     assert rows["ft.identity"] == "ok"
     assert (counters["starts"], counters["streaming"]) == (0, False)
     assert counters["requests"] > 10
+
+
+def test_an_adapter_that_is_pulled_out_meanwhile_is_said():
+    with ft300_process() as sensor:
+        pulled = threading.Timer(1.0, lambda: sensor.ask("hang_up"))
+        pulled.start()
+        rows = {row.check: row for row in ft_checks(real("ft", "port", sensor.port))}
+        pulled.join()
+    assert rows["ft.port"].result == "failed"
+    assert "went away" in rows["ft.port"].evidence
 
 
 @pytest.mark.parametrize("hold", ["monitor", "servo"])
