@@ -149,7 +149,7 @@ def judge(
         mean_first, sd_first = _mean_sd(sums.first[i], sums.first_squares[i], quarter)
         mean_last, sd_last = _mean_sd(sums.last[i], sums.last_squares[i], quarter)
         # Noise is measured within the quarters: over all samples a drift would raise the noise and so hide itself.
-        variance = (sd_first**2 + sd_last**2) / 2
+        variance = (sd_first * sd_first + sd_last * sd_last) / 2
         allowed = DRIFT_STANDARD_ERRORS * math.sqrt(2 * variance / quarter) + max(DRIFT_FLOOR[i], resolution[i])
         drift = mean_last - mean_first
         if not abs(drift) <= allowed:

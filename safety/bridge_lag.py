@@ -6,8 +6,6 @@ counts, and the baseline follows as fast as clocks may drift apart.
 
 from __future__ import annotations
 
-import math
-
 import msgspec
 
 BASELINE_NS = 1_000_000_000
@@ -15,6 +13,8 @@ RECENT = 3
 """The youngest of this many messages counts: what a pause of this machine delayed is no lag of the bridge."""
 DRIFT = 500e-6
 """The fastest at which time servers let a clock run off (RFC 5905, 500 ppm)."""
+MOST_STAMP_S = 2.0**32
+"""Seconds of ROS have 32 bits."""
 
 
 class Lag(msgspec.Struct, frozen=True, gc=False):
@@ -28,8 +28,8 @@ class Lag(msgspec.Struct, frozen=True, gc=False):
     """Age beyond the baseline; 0 in the first second."""
 
     def on_stamp(self, received_ns: int, stamp_s: float) -> Lag:
-        """Take in a message; one without a stamp (not finite, or 0) is left out."""
-        if not math.isfinite(stamp_s) or stamp_s <= 0.0:
+        """Take in a message; one without a stamp (none, 0, or what no clock of ROS can show) is left out."""
+        if not 0.0 < stamp_s < MOST_STAMP_S:
             return self
         recent = (*self.recent, received_ns - round(stamp_s * 1e9))[-RECENT:]
         if len(recent) < RECENT:

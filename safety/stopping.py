@@ -48,7 +48,7 @@ class Stopping(msgspec.Struct, frozen=True):
 
 def distance_m(speed_m_per_s: float, reaction_s: float, deceleration: float = BASE_DECELERATION_M_PER_S2) -> float:
     """Return the way (m) at full speed for `reaction_s`, and then braking at `deceleration` (m/s^2) to rest."""
-    return speed_m_per_s * reaction_s + speed_m_per_s**2 / (2.0 * deceleration)
+    return speed_m_per_s * reaction_s + speed_m_per_s * speed_m_per_s / (2.0 * deceleration)
 
 
 def alone_m(speed_m_per_s: float) -> float:

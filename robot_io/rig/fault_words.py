@@ -60,6 +60,7 @@ KINDS: dict[str, dict[str, FaultKind]] = {
         "spike": FaultKind("one sample in fifty is =N newton off along z", (100.0,)),
         "dead-axis": FaultKind("axis =N (0 to 5) repeats its first value", (2.0,), above=-1.0),
         "crc": FaultKind("one packet in =N is damaged", (2.0,), above=0.0),
+        "junk": FaultKind("one packet in =N is torn by a stray byte, and its bytes are junk", (2.0,), above=0.0),
         "lost": FaultKind("the link is gone"),
     },
     "arm": _any_stream(6, "the joints (rad)")

@@ -57,7 +57,7 @@ SURE = 0.999
 """Below this share of a floor no rounding of what follows makes a difference too large."""
 
 COMMAND_FLOOR_M = 0.012
-COMMAND_TIMING_S = 0.35
+COMMAND_TIMING_S = 0.25
 """The base follows a command within 0.1 s; that it stands still is told sooner by F33."""
 TRACKING = 0.05
 """Wheels do what they are told, to this share."""
@@ -163,7 +163,7 @@ def _perhaps_stuck(state: SafetyState, inp: TickInput) -> bool:
     if not force.stuck_since_ns or math.hypot(force.sent_x, force.sent_y) > STUCK_WAIT_M:
         return False
     way = (pose.x - force.from_x) * force.sent_x + (pose.y - force.from_y) * force.sent_y
-    return way < STUCK_SHARE * (force.sent_x**2 + force.sent_y**2)
+    return way < STUCK_SHARE * (force.sent_x * force.sent_x + force.sent_y * force.sent_y)
 
 
 def _near_by_pose(then: MotionMark, now: MotionMark) -> bool:

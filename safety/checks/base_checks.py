@@ -6,7 +6,7 @@ import math
 
 from msgspec.structs import replace
 
-from robot_io.messages import Pose2D
+from robot_io.messages import NO_BASE, Pose2D
 from robot_io.tick import ControlState, Mode, SafetyState, TickInput
 from safety.envelope import OVERSPEED_FACTOR, is_number, too_fast
 from safety.finding import NS_PER_MS, Finding
@@ -48,16 +48,21 @@ def check(
 def trusted_pose(settings: SafetySettings, state: SafetyState, inp: TickInput) -> Pose2D:
     """Return the pose for control: the newest, or the last valid one while that is invalid (F42) or a jump (F41).
 
-    Before the first valid pose it is the newest, even if that is invalid.
+    Before the first valid pose it is the newest, even if that is invalid; no pose where that is not finite.
     """
-    if not state.pose_seq or (_usable(inp) and not _jumps(settings, state, inp)):
+    if not state.pose_seq:
+        return inp.base.pose if _finite(inp.base.pose) else NO_BASE.pose
+    if _usable(inp) and not _jumps(settings, state, inp):
         return inp.base.pose
     return Pose2D(state.pose_x, state.pose_y, state.pose_yaw)
 
 
 def _usable(inp: TickInput) -> bool:
-    pose = inp.base.pose
-    return inp.base.pose_valid and math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)
+    return inp.base.pose_valid and _finite(inp.base.pose)
+
+
+def _finite(pose: Pose2D) -> bool:
+    return math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)
 
 
 def _jumps(settings: SafetySettings, state: SafetyState, inp: TickInput) -> int:

@@ -22,6 +22,8 @@ from safety.workspace import WorkspaceSettings, room_for_push, start_box
 
 STANDING_M_PER_S = 0.01
 """A slower measured speed has no direction."""
+FAR_M = 1e6
+"""Whatever would go further is outside anyway; beyond all numbers it would have no direction."""
 OBJECT_KNOWN_NS = 500_000_000
 """An object that was not seen for longer is not judged: it is in nobody's view."""
 
@@ -89,7 +91,7 @@ def _ahead(workspace: WorkspaceSettings, inp: TickInput, yaw: float, age_s: floa
             continue
         dx, dy = rotated(twist.vx / speed, twist.vy / speed, yaw)
         turn = twist.omega * ALONE_S
-        stop_m = alone_m(speed) + age_s * speed
+        stop_m = min(alone_m(speed) + age_s * speed, FAR_M)
         stop.append((dx * stop_m, dy * stop_m, turn))
         if speed > STANDING_M_PER_S:
             # By the rig's speed, not by the present one: the band does not end because SLOW has halved the speed.

@@ -16,6 +16,8 @@ from sim_backend.injection.stages import FLOW_KINDS, Flow, Progress, Stage, Valu
 
 Sample = Stamped[SensorWrench]
 SPIKE_EVERY = 50
+JUNK_BYTES = 17
+"""A packet of 16 bytes, torn by one that belongs to none."""
 
 
 class SomeSensor(Protocol):
@@ -39,6 +41,7 @@ class InjectedSensor:
         faults = injection.of("ft")
         self._lost = [fault for fault in faults if fault.word.kind == "lost"]
         self._crc = [fault for fault in faults if fault.word.kind == "crc"]
+        self._junk = [fault for fault in faults if fault.word.kind == "junk"]
         self._dropping = [fault for fault in faults if fault.word.kind in ("off", "slow", "intermittent")]
         self._stages = [_stage(fault, rig) for fault in faults if fault not in self._lost]
         self._gone = False
@@ -61,12 +64,15 @@ class InjectedSensor:
         """Return the health under the faults."""
         health = self._sensor.health()
         damaged = sum(fault.changed for fault in self._crc)
-        missing = damaged + sum(fault.changed for fault in self._dropping)
-        if missing:
-            counters = health.counters | {
-                "packets_ok": health.counters.get("packets_ok", 0) - missing,
-                "crc_fail": health.counters.get("crc_fail", 0) + damaged,
-            }
+        torn = sum(fault.changed for fault in self._junk)
+        more = {
+            "packets_ok": -damaged - torn - sum(fault.changed for fault in self._dropping),
+            "crc_fail": damaged + torn,
+            "junk_bytes": torn * JUNK_BYTES,
+            "resyncs": torn,
+        }
+        if more["packets_ok"]:
+            counters = health.counters | {name: health.counters.get(name, 0) + by for name, by in more.items() if by}
             health = replace(health, counters=counters)
         return replace(health, state=LinkState.LOST, cause="injected") if self._gone else health
 
@@ -74,7 +80,7 @@ class InjectedSensor:
 def _stage(fault: Progress, rig: RigConfig) -> Stage[Sample]:
     if fault.word.kind in FLOW_KINDS:
         return Flow(fault, _late, _when)
-    if fault.word.kind == "crc":
+    if fault.word.kind in ("crc", "junk"):
         return _Damaged(fault)
     change = _change(fault.word, rig)
     value = padded(fault.word.value or (0.0,), 6)
@@ -122,7 +128,7 @@ def _spikes(newton: float) -> changes.Change:
 
 
 class _Damaged:
-    """Drops one sample in so many, as a driver drops a packet with a wrong checksum."""
+    """Drops one sample in so many, as a driver drops a packet with a wrong checksum, or one torn by a stray byte."""
 
     def __init__(self, fault: Progress) -> None:
         self._fault = fault

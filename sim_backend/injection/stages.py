@@ -115,7 +115,10 @@ class Flow(Generic[T]):
             return since_ns % period_ns >= period_ns / 2
         if at_ns < self._next_ns:
             return False
-        self._next_ns = at_ns + round(NS_PER_S / word.value[0])
+        period_ns = round(NS_PER_S / word.value[0])
+        # By a clock, not from the last one: or jitter of the samples would make it slower than asked.
+        due_ns = self._next_ns if at_ns - self._next_ns < period_ns else at_ns
+        self._next_ns = due_ns + period_ns
         return True
 
 

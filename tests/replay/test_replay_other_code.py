@@ -159,7 +159,7 @@ def test_a_later_format_is_refused_in_true_words_and_still_looked_into(sim_ticks
         assert main(command) == USAGE
         told_words = capsys.readouterr().err
         assert "format 4" in told_words
-        assert "up to 2" in told_words
+        assert "up to 3" in told_words
         assert "single-point-push 0.9" in told_words
     assert main(["log", "info", str(log)]) == 0
     assert "format = 4" in capsys.readouterr().out
@@ -176,6 +176,6 @@ def test_a_format_that_is_no_number_is_damage(said, sim_log, tmp_path, capsys):
 
 def test_two_installations_without_a_checkout_are_told_apart_by_their_version():
     installed = {"program": "single-point-push 0.1.0", "format": "3"}
-    assert not compare_code(installed, installed, 2).other
-    assert compare_code({**installed, "program": "single-point-push 0.2.0"}, installed, 2).other
+    assert not compare_code(installed, installed, 3).other
+    assert compare_code({**installed, "program": "single-point-push 0.2.0"}, installed, 3).other
     assert compare_code({"program": "single-point-push 0.1.0"}, installed, 1).other

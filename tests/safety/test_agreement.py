@@ -15,7 +15,8 @@ from robot_io.tick import MotionMark, Phase
 from safety.checks import agreement_checks
 from tests.safety.fault_scenarios import base, shifted_pose, then
 from tests.safety.fold_bench import FoldBench, without_contact
-from tools.rig import resolve_rig
+from tests.safety.normal_pushes import Nothing
+from tools.rig import resolve_rig, with_faults
 from tools.run.lockstep import Lockstep
 
 FAST = ("control.push_speed_m_per_s=0.5", "control.distance_m=6")
@@ -138,14 +139,46 @@ def test_a_pose_counted_by_the_wheels_is_not_compared_with_them():
     assert ticks <= 300
 
 
-class Nothing:
-    """A log that keeps nothing."""
+WAYS = {"0.75": (0.75, 0.0), "1.33": (1.33, 0.0), "left": (1.0, 15.0), "right": (1.0, -15.0)}
 
-    def record(self, kind, time_ns, payload):
-        pass
 
-    def tick(self, time_ns, payload, tick):
-        pass
+def goes(share, degrees):
+    """Let the base go this share of what is sent, turned by so much, by odometry and pose alike."""
+    angle, gone = math.radians(degrees), [0.0, 0.0]
+
+    def alter(inp, _):
+        sent = inp.base.sent
+        x = share * (math.cos(angle) * sent.vx - math.sin(angle) * sent.vy)
+        y = share * (math.sin(angle) * sent.vx + math.cos(angle) * sent.vy)
+        gone[0] += (x - sent.vx) * 0.01
+        gone[1] += (y - sent.vy) * 0.01
+        inp = replace(inp, base=replace(inp.base, odometry=BodyTwist(x, y, 0.0)))
+        return shifted_pose(*gone)(inp, 0)
+
+    return alter
+
+
+@pytest.mark.parametrize("name", SPEEDS)
+@pytest.mark.parametrize("way", WAYS)
+def test_a_base_that_goes_another_way_than_sent_is_caught_within_30_centimetres_or_3_seconds(name, way):
+    bench, goes_on = moving(name)
+    alter = then(goes_on, goes(*WAYS[way])) if goes_on else goes(*WAYS[way])
+    way_m, time_s = 0.0, 0.0
+    while "F33-way" not in bench.output.faults:
+        assert not NAMES & set(bench.output.faults)
+        assert way_m <= 0.3 or time_s <= 3.0
+        way_m, time_s = way_m + math.hypot(bench.sent.vx, bench.sent.vy) * 0.01, time_s + 0.01
+        bench.fold(alter)
+    assert way_m <= 0.3 or time_s <= 3.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_quarter_too_slow_is_caught_within_3_seconds_in_spite_of_noise(seed):
+    rig = with_faults(resolve_rig("sim", ("control.distance_m=1.5",)), ("base.command.scaled=0.75 at 6 s",))
+    found = []
+    Lockstep(rig, seed, Nothing()).run(lambda inp, _state, output: found.append((inp.tick, output.faults)))
+    first = next(tick for tick, faults in found if "F33-way" in faults)
+    assert 600 < first <= 900
 
 
 def quiet(seed, *overrides):
@@ -159,13 +192,6 @@ def quiet(seed, *overrides):
 def test_a_normal_push_meets_none_of_these(slip):
     found = quiet(5, f"world.slip={slip}", "world.floor.patch_strength=0.3", "control.distance_m=0.8")
     assert found == ([], 0)
-
-
-@pytest.mark.long
-def test_two_hundred_normal_pushes_meet_none_of_these():
-    for seed in range(200):
-        slip = 0.1 * (seed % 11) / 10
-        assert quiet(seed, f"world.slip={slip}", "world.floor.patch_strength=0.3")[0] == [], seed
 
 
 OFF = st.floats(-0.03, 0.03)

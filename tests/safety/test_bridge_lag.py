@@ -55,6 +55,12 @@ def test_a_steady_bridge_does_not_lag_however_far_the_clocks_are_apart():
     assert heard(lambda _: -9e6, 60_000).growth_ns < MS
 
 
+@pytest.mark.parametrize("stamp_s", [0.0, -1.0, math.nan, math.inf, 2.0**32, 1e19, 1.7e308])
+def test_a_stamp_that_no_clock_of_ros_can_give_is_left_out(stamp_s):
+    """Its seconds have 32 bits; beyond 64 bits of nanoseconds the record could not be published."""
+    assert NEW.on_stamp(5_000 * MS, stamp_s) == NEW
+
+
 def test_a_lag_that_grows_by_30_ms_a_second_is_seen():
     """From 1 s on, when the baseline stands: 60 ms after 2 s more, 120 ms after 4 s."""
 

@@ -391,3 +391,16 @@ def test_before_the_first_good_pose_it_is_the_newest_whatever_it_is():
     assert used(SafetyState(), FAR, pose_valid=False) == FAR
     first_of_all = used(replace(KNOWN, pose_seq=1), FAR)  # one good pose is one to fall back on
     assert first_of_all == Pose2D(1.0, 2.0, 0.1)
+
+
+@pytest.mark.parametrize("bad", [math.inf, -math.inf, math.nan])
+@pytest.mark.parametrize("place", ["x", "y", "yaw"])
+def test_a_first_pose_that_is_no_number_is_a_fault_and_no_exception(bad, place):
+    bench = FoldBench()
+
+    def spoilt(inp, _since):
+        return replace(inp, base=replace(inp.base, pose=replace(inp.base.pose, **{place: bad})))
+
+    bench.run_until(lambda b: b.output.finished, spoilt, most=300)
+    assert "F42" in bench.output.faults
+    assert bench.output.command_body == BodyTwist()

@@ -1,33 +1,20 @@
 """Every row of the fault table: noticed in time, reacted to as it says, cleared only as it says; no row untested."""
 
-import ast
 import math
 
 import pytest
 from msgspec.structs import replace
 
-import tools.run.tick_core
 from robot_io.messages import BodyTwist
 from robot_io.tick import ControlState, Mode
-from safety import supervisor
-from safety.checks import (
-    agreement_checks,
-    arm_checks,
-    base_checks,
-    clock_checks,
-    force_checks,
-    host_checks,
-    link_checks,
-    motion_checks,
-    sensor_checks,
-    stuck_checks,
-    task_checks,
-    workspace_checks,
-)
+from safety.checks import task_checks
 from safety.faults import FAULTS, Clears, strongest
-from tests.mutants import load, tree_of
 from tests.safety.fault_scenarios import BY_THE_GATE, SCENARIOS, Scenario
 from tests.safety.fold_bench import FoldBench, pushing
+from tests.safety.removed_checks import install, places, remove, without
+from tools.faults.judgement import judged
+from tools.faults.lockstep_round import run_lockstep
+from tools.faults.scenarios import SCENARIOS as PROVED
 
 ids = [str(s) for s in SCENARIOS]
 
@@ -162,67 +149,12 @@ def test_the_table_says_what_it_means():
 
 # --- the test of the tests: without its check, a row goes unnoticed -----------------------------------------------
 
-CHECKS = {
-    "safety.checks.force_checks": force_checks,
-    "safety.checks.sensor_checks": sensor_checks,
-    "safety.checks.stuck_checks": stuck_checks,
-    "safety.checks.arm_checks": arm_checks,
-    "safety.checks.base_checks": base_checks,
-    "safety.checks.host_checks": host_checks,
-    "safety.checks.link_checks": link_checks,
-    "safety.checks.clock_checks": clock_checks,
-    "safety.checks.task_checks": task_checks,
-    "safety.supervisor": supervisor,
-    "safety.checks.workspace_checks": workspace_checks,
-    "safety.checks.motion_checks": motion_checks,
-    "safety.checks.agreement_checks": agreement_checks,
-}
-
-
-_REFUSED_BY_NAME = {"R02", "R03", "R02-dead", "R02-contact"}
-
-
-def rows_named(node: ast.AST) -> set[str]:
-    """Return the rows that a node names, but not those that an `if` inside it names."""
-    if isinstance(node, ast.Constant) and node.value in FAULTS:
-        return {node.value}
-    if isinstance(node, ast.Name) and node.id == "_REFUSALS":
-        return _REFUSED_BY_NAME
-    return {row for child in ast.iter_child_nodes(node) if not isinstance(child, ast.If) for row in rows_named(child)}
-
-
-def naming(tree: ast.Module) -> dict[str, list[ast.If]]:
-    """Return each row's `if`s: those whose own body (not that of an `if` inside it) names the row."""
-    found: dict[str, list[ast.If]] = {row: [] for row in FAULTS}
-    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
-        for one in (n for n in ast.walk(function) if isinstance(n, ast.If)):
-            for row in set().union(*map(rows_named, one.body)):
-                found[row].append(one)
-    return found
-
-
-def places() -> list[tuple[str, str, int]]:
-    """Return row, module and number of every `if` that decides over a row."""
-    ifs = {module: naming(tree_of(module)) for module in CHECKS}
-    return [(row, module, index) for row in FAULTS for module in CHECKS for index in range(len(ifs[module][row]))]
-
-
 PLACES = places()
-
-
-def without_check(row: str, module: str, index: int):
-    tree = tree_of(module)
-    naming(tree)[row][index].test = ast.Constant(False)
-    return load(module, tree)
 
 
 @pytest.mark.parametrize(("row", "module", "index"), PLACES, ids=[f"{r} in {m} {i}" for r, m, i in PLACES])
 def test_without_its_check_a_row_goes_unnoticed(row, module, index, monkeypatch):
-    blind = without_check(row, module, index)
-    if module == "safety.supervisor":
-        monkeypatch.setattr(tools.run.tick_core, "supervise", blind.supervise)
-    else:
-        monkeypatch.setattr(CHECKS[module], "check", blind.check)
+    install(without(row, module, index), module, monkeypatch)
     scenarios = [s for s in SCENARIOS if s.row == row]
     missed = []
     for scenario in scenarios:
@@ -234,9 +166,18 @@ def test_without_its_check_a_row_goes_unnoticed(row, module, index, monkeypatch)
 
 
 def test_every_row_has_a_check_to_remove():
-    by_give_up = {"F68"}  # raised by the fold itself, see the tests of the supervisor
+    by_give_up = {"F68"}  # raised by the fold itself
     rows = {row for row, _, _ in PLACES}
     assert set(FAULTS) - rows - set(BY_THE_GATE) - by_give_up == set()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", FAULTS)
+def test_without_its_checks_a_row_is_not_proved(row, monkeypatch):
+    """`push faults --run` notices, in each of the row's scenarios, although other rows may stop the base instead."""
+    remove(row, monkeypatch)
+    for scenario in (one for one in PROVED if one.row == row):
+        assert not judged(scenario, run_lockstep(scenario)).passed, scenario.what
 
 
 def test_one_jump_told_again_and_again_is_one_jump():

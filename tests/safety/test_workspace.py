@@ -68,6 +68,12 @@ def test_forward_to_the_edge(x, wanted):
     assert faults_at(BOX, (x, 0.0), sent=FORWARD, odometry=(math.nan, 0.0, 0.0)) == wanted, "odometry is no number"
 
 
+@pytest.mark.parametrize("speed", [1e3, 1e155, 1.7e308])
+def test_a_speed_whose_square_is_no_number_leaves_the_workspace(speed):
+    assert faults_at(BOX, (0.0, 0.0), odometry=(speed, 0.0, 0.0)) == ["F55-stop"]
+    assert faults_at(BOX, (0.0, 0.0), odometry=(0.0, -speed, 0.0)) == ["F55-stop"]
+
+
 def test_what_is_measured_is_the_room_beyond_the_stopping_distance():
     (slow,) = faults_at(BOX, (3.0 - 0.48 - 0.05, 0.0), sent=FORWARD)
     assert slow.value == pytest.approx(0.05 - 0.064)

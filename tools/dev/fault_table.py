@@ -22,8 +22,19 @@ reactions work. Limits are those of the rig `emulated`; a bound counts ticks of 
 the fault can be seen to the first reduced command.
 
 `push faults --run` brings every row about and measures the reaction; `--only F01` does so for one row or family.
+Each row is brought about at level sim, exact to the tick; those that a device alone can cause also at level emulated,
+with real drivers and processes: there the command that has arrived at the base counts (from the gate, where it is the
+base that does not obey), and may be two ticks later. A round in which this machine kept a process waiting and which
+failed is repeated, three times at most.
 With `--json`, `measured_ticks` is null where no command is to be reduced, and `pass` then says that the row did what
-it should.
+it should. Beyond the rows of the table these are proved:
+
+| id | what | passes if |
+|---|---|---|
+| F13 | the force is 50 ms late, its times are not | the push ends on the line, without a fault |
+| F62 | the wall clock jumps by an hour, again and again | not one byte of the log differs |
+| F71 | an hour of pushes on the virtual clock | no descriptor more is open, and at most 2 MB are kept |
+| F72 | two devices lost, or one and something of the host | the stronger reaction comes within the longer bound |
 
 ## Faults on demand
 

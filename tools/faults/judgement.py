@@ -11,6 +11,8 @@ from tools.faults.lockstep_round import NOT_ENDED, LockstepRound, Seen
 from tools.faults.scenario import Scenario
 
 LEAST_REDUCTION_M_PER_S = 1e-6
+WIRE_TICKS = 2
+"""What the way to the base may add to a bound."""
 
 
 class Proof(NamedTuple):
@@ -27,17 +29,21 @@ class Proof(NamedTuple):
     """Rounds on the wire that said nothing, because the host stalled."""
 
 
-def judged(scenario: Scenario, found: LockstepRound) -> Proof:
-    """Return what a lockstep run showed of the scenario's row."""
+def level_of(*, wire: bool) -> str:
+    """Return the level of a round."""
+    return "emulated" if wire else "sim"
+
+
+def judged(scenario: Scenario, found: LockstepRound, *, wire: bool = False) -> Proof:
+    """Return what a lockstep run, or one on the wire, showed of the scenario's row."""
     row = FAULTS[scenario.row]
+    bound = row.bound_ticks + (WIRE_TICKS if wire and row.mode > Mode.SILENT else 0)
     ticks = found.ticks
     named = next((i for i, seen in enumerate(ticks) if row.id in seen.faults), None)
-    if scenario.silent or scenario.dead:
-        named = found.first_bad
     bad = _first_bad(scenario, found)
 
     def result(measured: int | None, why: str) -> Proof:
-        return Proof(row.id, scenario.what, "sim", measured, row.bound_ticks, not why, why)
+        return Proof(row.id, scenario.what, level_of(wire=wire), measured, bound, not why, why)
 
     if bad is None:
         return result(None, "the fault to inject changed nothing")
@@ -56,8 +62,10 @@ def judged(scenario: Scenario, found: LockstepRound) -> Proof:
     )
     if obeyed is None:
         return result(None, "no command was reduced")
+    if row.mode < Mode.STOP <= ticks[obeyed].mode:
+        return result(None, f"stopped by {', '.join(ticks[obeyed].faults)} before it could act")
     measured = obeyed - bad
-    return result(measured, "" if measured <= row.bound_ticks else "too late")
+    return result(measured, "" if measured <= bound else "too late")
 
 
 def _codes(row: Fault) -> tuple[int, ...]:

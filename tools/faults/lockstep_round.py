@@ -9,6 +9,7 @@ from typing import NamedTuple
 from robot_io.messages import BodyTwist
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, Phase, TickInput, TickOutput, TickState
+from safety.gate import LATCH_FAULT
 from tools.faults.scenario import Moment, Scenario, at
 from tools.places.saved_tare import SavedTare
 from tools.rig import resolve_rig, with_faults
@@ -47,7 +48,7 @@ class LockstepRound(NamedTuple):
     exit_code: int
 
 
-class _NoLog:
+class NoLog:
     """Keeps nothing."""
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
@@ -79,7 +80,7 @@ class FaultyLockstep(Lockstep):
     """A lockstep run under a scenario."""
 
     def __init__(self, rig: RigConfig, seed: int, scenario: Scenario, from_tick: int) -> None:
-        super().__init__(rig, seed, _NoLog(), saved=usual_tare(seed) if scenario.in_contact else None)
+        super().__init__(rig, seed, NoLog(), saved=usual_tare(seed) if scenario.in_contact else None)
         self.safety = self._core.safety
         self._core = _FaultyCore(self._core, scenario, from_tick)  # type: ignore[assignment]
         self._scenario = scenario
@@ -90,7 +91,10 @@ class FaultyLockstep(Lockstep):
         super()._finish_tick(inp, after, output)
         command = self._gate.record.sent if self._scenario.by_gate and inp.tick >= self._from else output.command_body
         begun = self._scenario.begins is None or self._scenario.begins(inp, after)
-        self.ticks.append(Seen(after.control.phase, size(command), output.mode, output.faults, inp.base.pose.y, begun))
+        faults = output.faults
+        if self._scenario.silent or self._scenario.dead:  # nobody but the gate is left to name it
+            faults = (LATCH_FAULT.get(self._gate.told, ""),)
+        self.ticks.append(Seen(after.control.phase, size(command), output.mode, faults, inp.base.pose.y, begun))
         if len(self.ticks) > MOST_TICKS:
             raise _TooLong
 
@@ -158,14 +162,14 @@ def reference(settings: tuple[str, ...], seed: int) -> tuple[Seen, ...]:
             Seen(state.control.phase, size(output.command_body), output.mode, output.faults, inp.base.pose.y, True)
         )
 
-    Lockstep(_rig(settings), seed, _NoLog()).run(on_tick)
+    Lockstep(_rig(settings), seed, NoLog()).run(on_tick)
     return tuple(ticks)
 
 
 @cache
 def usual_tare(seed: int) -> SavedTare:
     """Return the tare of a run without a fault."""
-    found = Lockstep(_rig(SETTINGS), seed, _NoLog()).run(lambda *_: None)
+    found = Lockstep(_rig(SETTINGS), seed, NoLog()).run(lambda *_: None)
     return SavedTare((*found["bias_force_N"], *found["bias_torque_Nm"]), tuple(found["held_joints_rad"]), "", 0.0)
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
 from robot_io.tick import Mode
 from safety.faults import FAULTS
 from tools.faults import alterations as do
-from tools.faults.judgement import Proof
+from tools.faults.judgement import WIRE_TICKS, Proof, level_of
 from tools.faults.lockstep_round import LockstepRound, run_lockstep
 from tools.faults.scenario import Alter, Scenario
+from tools.faults.wire_proof import prove_on_wire
 
 ID = "F72"
 
@@ -40,22 +43,39 @@ HOST = {
 }
 
 
-def prove_pairs() -> list[Proof]:
-    """Return what came of every pair of lost devices, and of every lost device with every fault of the host."""
+ON_THE_WIRE = (
+    ("ft.off", "arm.off"),
+    ("ft.lost", "base.odometry.off"),
+    ("arm.off", "base.pose.off"),
+    ("base.odometry.off", "base.pose.off"),
+)
+
+
+def prove_pairs() -> Iterator[Proof]:
+    """Yield what came of every pair of lost devices, and of every lost device with every fault of the host.
+
+    All of them in lockstep, some of the devices' also on the wire.
+    """
     losses = DEVICES | HOST
-    pairs = [*combinations(DEVICES, 2), *((device, host) for device in DEVICES for host in HOST)]
-    return [_proof(f"{one} and {two}", losses[one], losses[two]) for one, two in pairs]
+    for one, two in (*combinations(DEVICES, 2), *((device, host) for device in DEVICES for host in HOST)):
+        scenario = _both(losses[one], losses[two], f"{one} and {two}")
+        yield _judged(losses[one], losses[two], scenario, run_lockstep(scenario))
+    for one, two in ON_THE_WIRE:
+        scenario = _both(losses[one], losses[two], f"{one} and {two}")
+        yield prove_on_wire(scenario, partial(_judged, losses[one], losses[two], wire=True))
 
 
-def _proof(what: str, one: Loss, two: Loss) -> Proof:
+def _both(one: Loss, two: Loss, what: str) -> Scenario:
+    return Scenario(one.row, what, one.words + two.words, alter=one.alter or two.alter)
+
+
+def _judged(one: Loss, two: Loss, scenario: Scenario, found: LockstepRound, *, wire: bool = False) -> Proof:
     """Judge a pair: the strongest reaction of both within the longer of their bounds, measured to the first zero."""
-    found = run_lockstep(Scenario(one.row, what, one.words + two.words, alter=one.alter or two.alter))
     wanted = max(FAULTS[one.row].mode, FAULTS[two.row].mode)
-    bound = max(FAULTS[one.row].bound_ticks, FAULTS[two.row].bound_ticks)
+    bound = max(FAULTS[one.row].bound_ticks, FAULTS[two.row].bound_ticks) + (WIRE_TICKS if wire else 0)
     measured = _to_zero(found, wanted)
-    if measured is None:
-        return Proof(ID, what, "sim", None, bound, False, f"no {wanted.name} came")
-    return Proof(ID, what, "sim", measured, bound, measured <= bound, "" if measured <= bound else "too late")
+    why = f"no {wanted.name} came" if measured is None else "" if measured <= bound else "too late"
+    return Proof(ID, scenario.what, level_of(wire=wire), measured, bound, not why, why)
 
 
 def _to_zero(found: LockstepRound, wanted: Mode) -> int | None:

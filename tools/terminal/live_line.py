@@ -79,9 +79,9 @@ class LiveLine:
             self._fd = -1
 
     def _line(self, status: dict[str, Any]) -> str:
-        # JSON has no NaN: a figure that is not known yet (no pose so far) is sent as null.
+        # JSON has no NaN: a figure that is not known yet (no pose so far), or no number, is sent as null.
         status = {key: math.nan if value is None else value for key, value in status.items()}
-        fx, fy, _ = status["force_N"]
+        fx, fy, _ = (math.nan if value is None else value for value in status["force_N"])
         control = self._rig.control
         return (
             f"{status['phase']:<9} {status['progress_m']:6.2f}/{control.distance_m:.2f} m  {status['mode']:<7}"

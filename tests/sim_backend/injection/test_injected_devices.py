@@ -1,6 +1,7 @@
 """Each kind of fault, at the edge of a device made of literal samples: what arrives, when, and what is counted."""
 
 import math
+import random
 
 import pytest
 from msgspec.structs import replace
@@ -164,6 +165,13 @@ def test_a_damaged_packet_is_dropped_and_counted_as_the_driver_does():
     assert bench.sensor.health().counters == {"packets_ok": 98, "crc_fail": 5}
 
 
+def test_a_packet_torn_by_a_stray_byte_is_junk_and_no_candidate_of_it_passes():
+    bench = Bench("ft.junk=4 at 0 s")
+    assert [len(bench.felt(10 * k, 1.0)) for k in range(8)] == [1, 1, 1, 0, 1, 1, 1, 0]
+    counters = {"packets_ok": 98, "crc_fail": 5, "junk_bytes": 34, "resyncs": 2}  # twice 16 bytes and one more
+    assert bench.sensor.health().counters == counters
+
+
 def test_a_lost_link_stays_lost():
     bench = Bench("ft.lost at 0.01 s for 0.01 s")
     assert len(bench.felt(0, 1.0)) == 1
@@ -175,6 +183,10 @@ def test_a_lost_link_stays_lost():
 def test_slow_delayed_and_intermittent_samples():
     bench = Bench("ft.slow=20 at 0 s")
     assert sum(len(bench.felt(10 * k, 1.0)) for k in range(100)) == 20
+    bench = Bench("ft.slow=50 at 0 s")
+    jitter = random.Random(0)
+    passed = sum(len(bench.felt(10 * k + jitter.choice((0, 1, 2)), 1.0)) for k in range(100))
+    assert 49 <= passed <= 51, "whatever the jitter of the samples"
     bench = Bench("ft.intermittent=0.2 at 0 s")
     assert [len(bench.felt(t, 1.0)) for t in (0, 90, 100, 190, 200, 290, 300)] == [0, 0, 1, 1, 0, 0, 1]
     bench = Bench("ft.delayed=0.05 at 0 s for 0.1 s")

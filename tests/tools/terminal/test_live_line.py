@@ -54,6 +54,12 @@ def test_one_line_a_second_where_it_is_no_terminal():
         assert "13.0/150 N" in lines[0]
 
 
+def test_a_force_that_is_no_number_is_shown_as_such():
+    with stderr_is_a_pipe() as to_pipe:
+        LiveLine(load_rig("emulated")).show(STATUS | {"force_N": [None, None, None], "theta_p": None})
+        assert "nan/150 N" in os.read(to_pipe, 65536).decode()
+
+
 def test_a_fault_is_said_in_words_once():
     with stderr_is_a_pipe() as to_pipe:
         live = LiveLine(load_rig("emulated"), quiet=True)
