@@ -43,9 +43,10 @@ def _spoil_line(emulator: Ft300Emulator, fault: WireFault) -> bool:
         emulator.latency_ms = round(fault.value[0])
     elif kind == "other-device":
         emulator.become("GRP-3.0.1")
-    elif kind == "crc":
+    elif kind in ("crc", "junk"):
         every = max(1, round(fault.value[0]))
-        emulator.knobs = replace(knobs, corrupt_every=every, corrupt_answer_every=every)
+        torn = {"corrupt_every" if kind == "crc" else "insert_byte_every": every}
+        emulator.knobs = replace(knobs, corrupt_answer_every=every, **torn)
     elif kind == "echo":
         emulator.knobs = replace(knobs, echo=True)
     elif kind in ("busy", "shared"):

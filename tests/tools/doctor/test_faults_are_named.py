@@ -26,6 +26,8 @@ SENSOR = [
     (["ft.crc=2 at 0 s"], "ft.crc", "failed"),
     (["ft.crc=15"], "ft.crc", "warning"),
     (["ft.streaming", "ft.crc=2"], "ft.crc", "failed"),
+    (["ft.junk=2"], "ft.crc", "failed"),
+    (["ft.streaming", "ft.junk=2"], "ft.crc", "failed"),
     (["ft.slow=5"], "ft.rate", "failed"),
     (["ft.frozen"], "ft.rate", "failed"),
     (["ft.intermittent=0.4"], "ft.rate", "warning or failed"),
