@@ -20,7 +20,7 @@ class RunNotes:
         self.events: list[dict[str, object]] = []
         self.fault_counts: dict[str, int] = {}
         self.course = PushCourse()
-        self._last: tuple[int, tuple[str, ...]] = (int(Mode.SILENT), ())
+        self._last: tuple[str, ...] = ()
         self._first_ns = 0
 
     def note(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
@@ -28,12 +28,10 @@ class RunNotes:
         self.course.note(after.control.phase, after.control.lateral_m)
         if not self._first_ns:
             self._first_ns = inp.now_ns
-        if (output.mode, output.faults) == self._last:
-            return
         for fault in output.faults:
-            if fault not in self._last[1]:
+            if fault not in self._last:
                 self.fault_counts[fault] = self.fault_counts.get(fault, 0) + 1
-        if output.faults != self._last[1] and len(self.events) < MOST_EVENTS:
+        if output.faults != self._last and len(self.events) < MOST_EVENTS:
             self.events.append(
                 {
                     "t_s": round((inp.now_ns - self._first_ns) * 1e-9, 3),
@@ -42,7 +40,7 @@ class RunNotes:
                     "faults": list(output.faults),
                 }
             )
-        self._last = (output.mode, output.faults)
+        self._last = output.faults
 
     def figures(self) -> dict[str, object]:
         """Return the notes as part of a run's figures."""

@@ -34,5 +34,9 @@ def test_a_push_that_met_nothing_has_no_offsets():
 
 
 def test_what_is_not_a_number_is_left_out():
-    found = followed((Phase.PUSH, 0.1), (Phase.PUSH, math.nan), (Phase.LOST, -0.05))
+    found = followed((Phase.PUSH, math.inf), (Phase.PUSH, 0.1), (Phase.PUSH, math.nan), (Phase.LOST, -math.inf))
     assert found == {"start_lateral_m": 0.1, "worst_lateral_m": 0.1}
+
+
+def test_of_two_that_are_as_large_the_first_is_the_worst():
+    assert followed((Phase.PUSH, 0.1), (Phase.PUSH, -0.1))["worst_lateral_m"] == 0.1

@@ -6,7 +6,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from control.notes.run_notes import MOST_EVENTS, RunNotes, outcome
+from control.notes.run_notes import RunNotes, outcome
 from robot_io.messages import Pose2D
 from robot_io.tick import ControlState, Mode, Phase, TickState
 from tests.safety.fold_bench import PERIOD_NS, FoldBench, pushing
@@ -37,10 +37,50 @@ def test_only_changes_are_noted_and_each_coming_is_counted():
 
 
 def test_the_notes_are_bounded_and_the_counts_go_on():
-    flicker = [(Mode.PUSHING, ("F52",)) if k % 2 else (Mode.PUSHING, ()) for k in range(3 * MOST_EVENTS)]
+    flicker = [(Mode.PUSHING, ("F52",)) if k % 2 else (Mode.PUSHING, ()) for k in range(600)]
     notes = noted(*flicker)
-    assert len(notes.events) == MOST_EVENTS
-    assert notes.fault_counts == {"F52": 3 * MOST_EVENTS // 2}
+    assert len(notes.events) == 200
+    assert notes.fault_counts == {"F52": 300}
+
+
+def test_times_are_given_to_the_millisecond():
+    bench, notes = pushing(), RunNotes()
+    bench.fold()
+    notes.note(bench.inp, bench.state, bench.output)
+    later = replace(bench.inp, now_ns=bench.inp.now_ns + 12_345_678)
+    notes.note(later, bench.state, replace(bench.output, faults=("F52",)))
+    assert notes.events[-1]["t_s"] == 0.012
+
+
+def test_the_course_of_the_push_is_part_of_the_notes():
+    bench, notes = pushing(), RunNotes()
+    for lateral_m in (0.02, -0.07, 0.01):
+        control = replace(bench.state.control, phase=int(Phase.PUSH), lateral_m=lateral_m)
+        notes.note(bench.inp, replace(bench.state, control=control), bench.output)
+    assert (notes.figures()["start_lateral_m"], notes.figures()["worst_lateral_m"]) == (0.02, -0.07)
+
+
+def test_the_first_fault_has_its_value_and_its_time_since_the_first_tick():
+    bench = pushing()
+    bench.fold()
+    safety = replace(
+        bench.state.safety, first_fault="F50", first_value=163.0, first_ns=2_000_000_000, first_fault_ns=14_400_000_000
+    )
+    found = outcome(bench.inp, replace(bench.state, safety=safety), bench.output)
+    assert (found["first_fault"], found["first_value"]) == ("F50", 163.0)
+    assert found["first_fault_s"] == pytest.approx(12.4)
+    unknown = replace(safety, first_value=math.nan)
+    assert outcome(bench.inp, replace(bench.state, safety=unknown), bench.output)["first_value"] is None
+    none = replace(safety, first_fault="", first_fault_ns=0)
+    assert outcome(bench.inp, replace(bench.state, safety=none), bench.output)["first_fault_s"] is None
+
+
+def test_joints_that_are_no_numbers_are_none():
+    bench = pushing()
+    bench.fold()
+    joints = replace(bench.inp.arm.joints, position=(0.5, math.nan, 1.5, -0.25, math.inf, 2.0))
+    inp = replace(bench.inp, arm=replace(bench.inp.arm, joints=joints))
+    assert outcome(inp, bench.state, bench.output)["joints_rad"] == [0.5, None, 1.5, -0.25, None, 2.0]
 
 
 @pytest.mark.parametrize("phase", list(Phase))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from typing import NamedTuple
 
 from robot_io.errors import ConfigError, DeviceError, EnvironmentFault, PushError
@@ -12,6 +13,9 @@ from tools.kinds import name_of
 KINDS: dict[int, type[PushError]] = {kind.exit_code: kind for kind in (ConfigError, EnvironmentFault, DeviceError)}
 ORDER = ("control", "arm", "gate")
 """The processes that open sensor, arm and base."""
+
+KILLED_BY_OTHERS = (-signal.SIGKILL, -signal.SIGTERM)
+DO_WHEN_KILLED = "Somebody or the system ended it: see whether memory ran out (`dmesg`), then try again"
 
 
 class Failure(NamedTuple):
@@ -47,6 +51,8 @@ def start_timeout(waiting: list[Child], rig: RigConfig) -> DeviceError:
 def _failures(child: Child) -> list[Failure]:
     if child.errors:
         return [Failure(child.name, error) for error in child.errors]
+    if child.process.returncode in KILLED_BY_OTHERS:
+        return [Failure(child.name, EnvironmentFault(f"its process {child.how_it_ended()}", do=DO_WHEN_KILLED))]
     do = f"This is a bug in the program; its output is in {child.save_stderr()}" if child.last_stderr_line() else ""
     return [Failure(child.name, PushError(f"its process {child.how_it_ended()}", do=do))]
 

@@ -98,9 +98,16 @@ def test_a_crash_is_a_defect_whose_traceback_is_kept(child, tmp_path, monkeypatc
     assert kept.read_text().startswith("Traceback")
 
 
-def test_a_killed_process_names_the_signal(child):
-    error = combined_error([child("gate", "import os; os.kill(os.getpid(), 9)")], RIG)
-    assert (error.what, error.do) == ("its process was killed by SIGKILL", "")
+@pytest.mark.parametrize("name", ["SIGKILL", "SIGTERM"])
+def test_a_process_that_somebody_killed_is_no_defect_of_the_program(child, name):
+    error = combined_error([child("gate", f"import os, signal; os.kill(os.getpid(), signal.{name})")], RIG)
+    assert (error.exit_code, error.what) == (3, f"its process was killed by {name}")
+    assert "memory" in error.do
+
+
+def test_a_process_that_crashed_is_one(child):
+    error = combined_error([child("gate", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")], RIG)
+    assert (error.exit_code, error.what) == (1, "its process was killed by SIGSEGV")
 
 
 def test_one_that_hangs_is_named(child):
