@@ -42,6 +42,11 @@ COMMANDS = {
         "stop the runs under way, or a rig's base by zeros",
         ("push stop", "push stop emulated --json"),
     ),
+    "doctor": Command(
+        "tools.commands.doctor",
+        "look at every device, this machine and the rig; nothing moves",
+        ("push doctor emulated", "push doctor my-rig.toml --json"),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",

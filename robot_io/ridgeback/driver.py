@@ -38,7 +38,7 @@ LINK_STALE_NS = 300 * NS_PER_MS
 """The link is given up when nothing has come from the bridge for this long, or no command of ours was heard back."""
 BACKLOG_NS = 200 * NS_PER_MS
 """The link is reset when more waits than can be read, for longer than this."""
-FIRST_MESSAGE_TIMEOUT_S = 2.0
+FIRST_MESSAGE_TIMEOUT_S = 4.0
 
 ZERO = BodyTwist()
 
@@ -125,7 +125,7 @@ class Ridgeback(DriverBase):
         return DeviceInfo("ridgeback", self.url, "Ridgeback", link.server, remarks=answers.remarks(self._topic))
 
     def start(self) -> None:
-        """Wait for the first message of pose, odometry and status; at most 2 s.
+        """Wait for the first message of pose, odometry and status, which comes once a second; at most 4 s.
 
         Raises DeviceNotReady naming the topics that stayed silent, DeviceUnreachable when the link breaks.
         """

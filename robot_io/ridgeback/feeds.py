@@ -88,7 +88,13 @@ class FeedReader:
         self.counters = dict.fromkeys(("pose", "pose_flawed", "odometry", "status", "slider", "echo", "unasked"), 0)
         self._heard: set[str] = set()
         self._frames: dict[str, tuple[str, str]] = {}
+        self._first_frame = ""
         self._origin: Pose2D | None = None
+
+    @property
+    def pose_frame(self) -> str:
+        """Return the frame that the first pose came in, "" before it."""
+        return self._first_frame
 
     def silent_topics(self) -> list[str]:
         """Return the required topics on which nothing usable has come yet."""
@@ -123,6 +129,7 @@ class FeedReader:
 
     def _base_pose(self, reading: PoseReading, received_ns: int) -> Stamped[BaseFeed]:
         flaw = reading.flaw or self._wrong_frame(self._pose_topic, reading)
+        self._first_frame = self._first_frame or reading.frame
         pose = reading.pose
         if flaw:
             self.counters["pose_flawed"] += 1

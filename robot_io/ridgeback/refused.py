@@ -20,16 +20,19 @@ class RefusedMessages:
             written = text[:4096].decode(errors="replace").replace("\\/", "/")  # JSON may escape a slash
             self._kept.append((written, " ".join(str(reason).split())[:SHOWN_CHARACTERS]))
 
+    def reason_of(self, topic: str) -> str:
+        """Return why a message of a topic was refused, "" where none was."""
+        return next((reason for text, reason in self._kept if f'"{topic}"' in text), "")
+
     def explain(self, silent: list[str], where: str, within_s: float) -> DeviceError:
         """Return the error of topics without a usable message: none came, or those that came could not be read."""
         for topic in silent:
-            for text, reason in self._kept:
-                if f'"{topic}"' in text:
-                    return DeviceProtocolError(
-                        f"messages on {topic} arrived but could not be read ({reason})",
-                        where=where,
-                        do="Check the publisher: NaN and Infinity are not JSON, and another type has other fields",
-                    )
+            if reason := self.reason_of(topic):
+                return DeviceProtocolError(
+                    f"messages on {topic} arrived but could not be read ({reason})",
+                    where=where,
+                    do="Check the publisher: NaN and Infinity are not JSON, and another type has other fields",
+                )
         return DeviceNotReady(
             f"no message on {', '.join(silent)} within {within_s:g} s",
             where=where,

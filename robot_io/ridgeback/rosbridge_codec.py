@@ -123,10 +123,22 @@ class _Subscribers(msgspec.Struct, gc=False):
     subscribers: list[str]
 
 
+class _Time(msgspec.Struct, gc=False):
+    secs: int = 0
+    nsecs: int = 0
+    sec: int = 0
+    nanosec: int = 0
+
+
+class _TimeAnswer(msgspec.Struct, gc=False):
+    time: _Time
+
+
 _decode_envelope = decoder_of(_Envelope)
 _decode_topic_type = decoder_of(_TopicType)
 _decode_subscribers = decoder_of(_Subscribers)
 _decode_publishers = decoder_of(_Publishers)
+_decode_time = decoder_of(_TimeAnswer)
 
 
 def decode_frame(text: bytes) -> Inbound:
@@ -152,3 +164,9 @@ def decode_publishers(values: bytes) -> list[str]:
 def decode_subscribers(values: bytes) -> list[str]:
     """Decode the answer of /rosapi/subscribers: node names."""
     return _decode_subscribers(values).subscribers
+
+
+def decode_time(values: bytes) -> float:
+    """Decode the answer of /rosapi/get_time: the robot's wall clock, s."""
+    at = _decode_time(values).time
+    return (at.secs or at.sec) + (at.nsecs or at.nanosec) * 1e-9

@@ -31,7 +31,7 @@ class Ft300Emulator:
 
     rate_hz, phase: samples at (k + phase) / rate_hz of the monotonic clock. latency_ms: 0, 1 or 16. streaming:
     starts in stream mode, as after a client crash. link: a stable name for the pty. `knobs` may be replaced
-    while it runs (`paced` excepted).
+    while it runs (`paced` excepted), and so may `source`.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Ft300Emulator:
         self.knobs = knobs or Ft300Knobs()
         self.latency_ms = latency_ms
         self._loop = loop
-        self._source = source
+        self.source = source
         self._period_ns = NS_PER_S / rate_hz
         self._phase = phase
         self._streams_at_boot = streaming
@@ -71,6 +71,7 @@ class Ft300Emulator:
         self._stalled_until_ns = 0
         self._heard_until_ns = 0
         self._packets = 0
+        self._answers = 0
         self._counted = dict.fromkeys(
             ("samples", "samples_skipped", "packets_sent", "packets_withheld", "bytes_delivered", "bytes_lost",
              "bytes_garbled", "requests", "starts", "stops"), 0
@@ -95,7 +96,7 @@ class Ft300Emulator:
         """Create the pty and start measuring."""
         self._port.open()
         now_ns = monotonic_ns()
-        self._registers.counts = wire.to_counts(self._source.read_ft(now_ns))
+        self._registers.counts = wire.to_counts(self.source.read_ft(now_ns))
         self._sample_index = int(now_ns / self._period_ns - self._phase) + 1
         self._at("sample", self._sample_ns(), self._on_sample)
 
@@ -105,6 +106,14 @@ class Ft300Emulator:
             timer.cancel()
         self._timers.clear()
         self._port.close()
+
+    def keep_streaming(self) -> None:
+        """Be found streaming, as after a client that crashed."""
+        self._streaming = True
+
+    def become(self, firmware: str) -> None:
+        """Be another device, with this firmware."""
+        self._registers = SensorRegisters(firmware, "FTA-12345", 2018, (0.0, 0.0, -1.0))
 
     def stall(self, duration_s: float) -> None:
         """Send and receive nothing for a while, then continue as if nothing had happened."""
@@ -131,7 +140,7 @@ class Ft300Emulator:
         return round((self._sample_index + self._phase) * self._period_ns)
 
     def _on_sample(self, sample_ns: int) -> None:
-        self._registers.counts = wire.to_counts(self._source.read_ft(sample_ns))
+        self._registers.counts = wire.to_counts(self.source.read_ft(sample_ns))
         self._check_baud()
         self._counted["samples"] += 1
         if self._streaming and not self._is_stalled(sample_ns):
@@ -203,6 +212,8 @@ class Ft300Emulator:
         self._check_baud()
         if not self._baud_fits:
             data = self._garbled(data)
+        if self.knobs.echo:
+            self._port.write(data)
         self._to_sensor.put(data, monotonic_ns())
         if self._to_sensor.room < READ_BYTES:
             self._port.pause()
@@ -267,7 +278,14 @@ class Ft300Emulator:
                 lambda at_ns: self._select(selected, reply.answer, at_ns),
             )
         elif self.knobs.unknown == "exception" or not reply.is_refusal:
-            self._at("answer", now_ns + _ns(self.knobs.answer_delay_ms), lambda at_ns: self._send(reply.answer, at_ns))
+            answer = self._perhaps_damaged(reply.answer)
+            self._at("answer", now_ns + _ns(self.knobs.answer_delay_ms), lambda at_ns: self._send(answer, at_ns))
+
+    def _perhaps_damaged(self, answer: bytes) -> bytes:
+        self._answers += 1
+        every = self.knobs.corrupt_answer_every
+        damaged = every > 0 and self._answers % every == 0
+        return answer[:-1] + bytes((answer[-1] ^ 0x10,)) if damaged else answer
 
     def _select(self, selected: int, answer: bytes, at_ns: int) -> None:
         self._registers.output = selected

@@ -24,6 +24,10 @@ class Ft300Knobs(msgspec.Struct, frozen=True):
     """How long it ignores input after a stop (real: unknown; some clients ask at once, others wait 100 ms)."""
     unknown: Literal["exception", "silence"] = "exception"
     """Answer to unknown registers, functions and values."""
+    echo: bool = False
+    """Whether the adapter sends back what it is sent, as an RS-485 adapter does whose receiver stays on."""
+    corrupt_answer_every: int = 0
+    """As the others below, but it counts answers."""
     corrupt_every: int = 0
     drop_byte_every: int = 0
     insert_byte_every: int = 0

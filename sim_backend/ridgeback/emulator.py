@@ -45,7 +45,7 @@ class RosbridgeEmulator:
         self._loop = loop
         settings = settings.resolved()
         self._bridge = bridge
-        self._clock_offset_ns = wall_offset_ns() + round(bridge.clock_skew_s * NS_PER_S)
+        self.clock_offset_ns = wall_offset_ns() + round(bridge.clock_skew_s * NS_PER_S)
         self._counters: Counter[str] = Counter()
         self._sessions: dict[WebSocketPeer, Session] = {}
         self._outbox: deque[tuple[int, WebSocketPeer, str]] = deque(maxlen=_MAX_HELD)
@@ -57,7 +57,7 @@ class RosbridgeEmulator:
         self.zero_on_new_connection = bridge.zero_on_new_connection
         types = RosTypes(settings.topics.ros_version, lambda: self._stamp(monotonic_ns()))
         self.graph = RosGraph(types)
-        self._rosapi = RosApi(self.graph, lambda: self._stamp(monotonic_ns())) if bridge.rosapi else None
+        self.rosapi = RosApi(self.graph, lambda: self._stamp(monotonic_ns())) if bridge.rosapi else None
         writer = FeedWriter(
             settings.topics.ros_version, lambda t_ns: types.time(self._stamp(t_ns)), settings.base_from_marker
         )
@@ -109,14 +109,14 @@ class RosbridgeEmulator:
             self._release_timer.cancel()
 
     def _stamp(self, t_ns: int) -> tuple[int, int]:
-        return divmod(t_ns + self._clock_offset_ns, NS_PER_S)
+        return divmod(t_ns + self.clock_offset_ns, NS_PER_S)
 
     def _on_open(self, peer: WebSocketPeer) -> None:
         self._counters["clients_opened"] += 1
         self._sessions[peer] = Session(
             self._loop,
             self.graph,
-            self._rosapi,
+            self.rosapi,
             lambda text: self._send(peer, text),
             self._counters,
             escape_slashes=self._bridge.escape_slashes,

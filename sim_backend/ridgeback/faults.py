@@ -10,6 +10,7 @@ from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
 from robot_io.messages import BodyTwist, Pose2D
 from sim_backend.ridgeback.emulator import RosbridgeEmulator
+from sim_backend.ridgeback.ros_graph import Message, Topic
 from sim_backend.ridgeback.websocket_server import WebSocketPeer
 
 _JOYSTICK_PERIOD_NS = NS_PER_S // 20
@@ -88,6 +89,41 @@ class BridgeFaults:
         """Set the battery's voltage; visible in the next status (1 Hz)."""
         self._status(battery_v=volt)
 
+    def motors_off(self) -> None:
+        """Switch the motors off without a stop."""
+        self._status(drivers_active=False)
+
+    def other_publisher(self, node: str = "/teleop") -> None:
+        """Let another node be a publisher of the command topic; it stays silent."""
+        self._command().nodes.add(node)
+
+    def other_client(self) -> None:
+        """Let another client of the bridge be a publisher of the command topic; it stays silent."""
+        self._command().advertisers.add(self)
+
+    def other_commands(self, twist: BodyTwist) -> None:
+        """Let another node command the base at 20 Hz, for good."""
+        graph, topic = self._emulator.graph, self._command()
+        message = {"linear": {"x": twist.vx, "y": twist.vy}, "angular": {"z": twist.omega}}
+        filled = graph.types.filled("geometry_msgs/Twist", message)
+        self._timers.append(self._loop.call_every(_JOYSTICK_PERIOD_NS, lambda _: graph.publish(topic, filled)))
+
+    def topic_type(self, topic: str, type_name: str) -> None:
+        """Let a topic carry another type."""
+        self._emulator.graph.topics[topic].type_name = type_name
+
+    def no_rosapi(self) -> None:
+        """Run the bridge without rosapi, for clients that come later."""
+        self._emulator.rosapi = None
+
+    def set_clock(self, ahead_s: float) -> None:
+        """Set the robot's clock ahead of what it is."""
+        self._emulator.clock_offset_ns += round(ahead_s * NS_PER_S)
+
+    def alter(self, change: Callable[[str, Message], Message | None]) -> None:
+        """Change or drop (None) messages by topic before anybody gets them."""
+        self._emulator.graph.alter = change
+
     def joystick(self, twist: BodyTwist, seconds: float) -> None:
         """Drive by joystick at 20 Hz; it overrides all other inputs until half a second afterwards."""
         until_ns = monotonic_ns() + round(seconds * NS_PER_S)
@@ -105,6 +141,9 @@ class BridgeFaults:
         """Cancel all pending faults."""
         for timer in self._timers:
             timer.cancel()
+
+    def _command(self) -> Topic:
+        return self._emulator.graph.topics[self._emulator.nodes.command_topic]
 
     def _after(self, seconds: float, action: Callable[[], None]) -> None:
         deadline_ns = monotonic_ns() + round(seconds * NS_PER_S)

@@ -70,6 +70,11 @@ class RidgebackNodes:
             period_ns = round(NS_PER_S / (rate_hz * speed_up))
             self._timers.append(loop.call_every(period_ns, tick, start_ns + round(phase * period_ns)))
 
+    @property
+    def command_topic(self) -> str:
+        """Name of the topic that the rig commands."""
+        return self._topics.command
+
     def set_listening(self, on: bool) -> None:
         """Subscribe the nodes behind the command topics, or unsubscribe them."""
         for name in self.command_topics:

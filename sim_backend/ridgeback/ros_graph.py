@@ -56,6 +56,8 @@ class RosGraph:
         self.types = types
         self.topics: dict[str, Topic] = {}
         self._spellings: set[str] = set()
+        self.alter: Callable[[str, Message], Message | None] | None = None
+        """What becomes of a message on the topic of that name before anybody gets it; None: nobody does."""
 
     def resolve(self, name: str) -> str:
         """Return a topic's full name."""
@@ -96,6 +98,11 @@ class RosGraph:
 
     def publish(self, topic: Topic, message: Message, *, latch: bool = False) -> None:
         """Deliver a complete message to all subscribers."""
+        if self.alter is not None:
+            altered = self.alter(topic.name, message)
+            if altered is None:
+                return
+            message = altered
         if latch:
             topic.latched = message
         for listen in list(topic.listeners.values()):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import DashboardServer
 from sim_backend.ur10.modes import RobotMode, SafetyMode
+from sim_backend.ur10.registers import REGISTERS
 from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
 
@@ -101,6 +102,15 @@ class UrFaults:
         """Accept dashboard connections but send nothing."""
         self.dashboard.muted = on
 
+    def take_inputs(self) -> None:
+        """Hold every general-purpose input register, as a fieldbus does."""
+        names = [f"input_{kind}_register_{i}" for kind in ("int", "double") for i in range(REGISTERS)]
+        self.rtde.owners.update(dict.fromkeys(names, self))
+
+    def be_model(self, model: str) -> None:
+        """Call itself another robot."""
+        self.dashboard.dashboard.model = model
+
     def freeze(self, on: bool = True) -> None:
         """Freeze the controller as SIGSTOP does: the kernel accepts connections, nothing is read or answered."""
         for server in self._servers():
@@ -115,6 +125,10 @@ class UrFaults:
         """Cut the values of the next data frame; its header matches the shortened frame."""
         for client in self.rtde.rtde_clients:
             client.cut_frame_to = values_bytes
+
+    def truncate_all_data(self, values_bytes: int) -> None:
+        """Cut the values of every data frame from now on."""
+        self.rtde.cut_frames_to = values_bytes
 
     def send_garbage(self, data_hex: str = "00000000ffff55") -> None:
         """Send raw bytes (hex) in place of a frame."""

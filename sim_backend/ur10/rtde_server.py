@@ -121,6 +121,8 @@ class RtdeClient(TcpClient):
         if self.cut_frame_to is not None:
             values = values[: self.cut_frame_to]
             self.cut_frame_to = None
+        if self.rtde.cut_frames_to is not None:
+            values = values[: self.rtde.cut_frames_to]
         self.reply("U", (b"\x01" if self.version == 2 else b"") + values)
         counters["data_sent"] += 1
 
@@ -219,8 +221,10 @@ class RtdeServer(TcpServer):
     def __init__(self, loop: EventLoop, host: str, robot: UrController, requests: RequestLog) -> None:
         self.robot = robot
         self.requests = requests
-        self.owners: dict[str, RtdeClient] = {}
+        self.owners: dict[str, object] = {}
         self.muted = False
+        self.cut_frames_to: int | None = None
+        """Every data frame has only so many bytes of values."""
         self.counters = {"data_sent": 0, "data_dropped": 0}
         self.rtde_clients: list[RtdeClient] = []
         super().__init__(loop, host, RTDE_PORT, self._connect)

@@ -286,6 +286,7 @@ def test_another_client_of_the_bridge_is_no_listener():
 
 
 def test_a_silent_topic_is_named():
+    """A topic that speaks once a second is waited for 4 s; connecting to a bridge that answers takes no second."""
     topics = TopicsConfig(base_pose="/vicon/Nobody/Nobody")
     with running_bridge() as bridge:
         began = time.monotonic()
@@ -294,7 +295,7 @@ def test_a_silent_topic_is_named():
             Ridgeback(bridge.url, topics=topics),
         ):
             pass
-        assert time.monotonic() - began < 4.0
+        assert 4.0 <= time.monotonic() - began < 5.0
         assert "/odometry/filtered" not in caught.value.what
 
 

@@ -12,14 +12,14 @@ from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools.commands.run_outputs import save_tare, write_report, write_summary
-from tools.kinds import device_names
 from tools.places import run_dir, saved_tare
 from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
 from tools.run.awake import awake
-from tools.run.facts.bounds import bounds_lines, bounds_of, check_room
+from tools.run.facts.bounds import bounds_of, check_room
+from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
@@ -29,8 +29,6 @@ from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
 
-MOST_DESCRIPTORS = 128
-"""Files and sockets that any process of a run has open at the same time, with room to spare."""
 MAX_SEED = 2**63 - 1
 """The largest integer that the log can hold."""
 
@@ -57,6 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
     )
+    parser.add_argument("--check", action="store_true", help="what `push doctor` and --dry-run say; nothing moves")
+    parser.add_argument("--yes", action="store_true", help="do not ask on the terminal before a real robot moves")
     parser.add_argument("--dry-run", action="store_true", help="show what would run, without connecting to anything")
     parser.add_argument("--move-robot", action="store_true", help="needed before any real device is opened")
     parser.add_argument(
@@ -73,13 +73,19 @@ def run(args: argparse.Namespace) -> int:
     if warning := gain_warning(rig):
         tell(warning)
     saved = saved_tare.load(rig) if args.start_in_contact else None
-    if args.dry_run:
-        return dry_run(args, rig)
+    if args.check or args.dry_run:
+        from tools.doctor.dry_run import check_only, dry_run
+
+        as_json = args.json
+        return check_only(rig, folder_of(args.rig), as_json=as_json) if args.check else dry_run(rig, as_json=as_json)
     simulated = bool(devices_at(rig, "sim"))
     if not simulated:
-        print_levels(rig)
-    print_bounds(rig)
+        tell_levels(rig)
+    if not devices_at(rig, "hardware"):
+        tell_bounds(rig)
     with DeviceLocks(rig):
+        if devices_at(rig, "hardware"):
+            prepare(args, rig)
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
@@ -125,14 +131,14 @@ def overrides(args: argparse.Namespace) -> list[str]:
 def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
     """Raise UsageError for flags that contradict the rig; nothing has been opened yet."""
     hardware = devices_at(rig, "hardware")
-    if hardware and not args.move_robot and not args.dry_run:
+    if hardware and not (args.move_robot or args.dry_run or args.check):
         raise UsageError(
             f"rig {rig.name!r} moves a real robot ({', '.join(hardware)} at level hardware)",
             where="push run",
             do="Clear the floor, hold the e-stop, and add --move-robot",
         )
     blind = blind_words(rig)
-    if blind and not args.drive_blind:
+    if blind and not (args.drive_blind or args.check):
         raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
@@ -141,51 +147,15 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
     check_room(rig, args.seed)
 
 
-def print_levels(rig: RigConfig) -> None:
-    """Print the level of each device, and the address of the real ones."""
-    for device, level in (("ft", rig.ft.level), ("arm", rig.arm.level), ("base", rig.base.level)):
-        where = {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}[device]
-        tell(f"{device:<5} {level:<9} {where if level == 'hardware' else ''}".rstrip())
+def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
+    """Look at the real devices, and ask before a real robot moves. Raises DeviceError and OperatorStop."""
+    from tools.doctor.before_run import look_before_run
+    from tools.doctor.consent import ask_once
 
-
-def blind_words(rig: RigConfig) -> str:
-    """Return in words what a real base does not feel, "" where all its devices are real or it is not real itself."""
-    emulated = devices_at(rig, "emulated")
-    if rig.base.level != "hardware" or not emulated:
-        return ""
-    verb = "is" if len(emulated) == 1 else "are"
-    return f"the real base moves blind: {' and '.join(emulated)} of its rig {verb} only emulated"
-
-
-def print_bounds(rig: RigConfig) -> None:
-    """Print what bounds the motion of a run."""
-    for line in (*bounds_lines(rig), *filter(None, [blind_words(rig)])):
-        tell(line)
-
-
-def dry_run(args: argparse.Namespace, rig: RigConfig) -> int:
-    """Print what would run; return 0."""
-    sensor, arm, base = device_names(rig)
-    facts = {
-        "schema": 1,
-        "dry_run": True,
-        "rig": rig.name,
-        "devices": {
-            sensor: {"level": rig.ft.level, "port": rig.ft.port},
-            arm: {"level": rig.arm.level, "host": rig.arm.host, "hold": rig.arm.hold},
-            base: {"level": rig.base.level, "url": rig.base.url},
-        },
-        "distance_m": rig.control.distance_m,
-        "controller": rig.control.controller,
-        "push_speed_m_per_s": rig.control.push_speed_m_per_s,
-        "bounds": bounds_of(rig),
-    }
-    print_levels(rig)
-    print_bounds(rig)
-    tell(f"would push {rig.control.distance_m:g} m at {rig.control.push_speed_m_per_s:g} m/s; nothing was opened")
-    if args.json:
-        say_json(facts)
-    return 0
+    look_before_run(rig, folder_of(args.rig))
+    tell_bounds(rig)
+    if not args.yes:
+        ask_once(rig, "Push now?")
 
 
 def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
@@ -193,6 +163,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
     launcher = None
     try:
         from tools.run.launcher import Launcher
+        from tools.run.processes import MOST_DESCRIPTORS
 
         allow_descriptors(MOST_DESCRIPTORS)
 

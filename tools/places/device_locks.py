@@ -26,6 +26,8 @@ class Resource(NamedTuple):
 
     key: str
     address: str
+    device: str
+    """ft, arm or base."""
 
 
 class Holder(msgspec.Struct, frozen=True):
@@ -41,7 +43,7 @@ def resources_of(rig: RigConfig) -> list[Resource]:
     addresses = {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}
     finders = {"ft": _sensor_keys, "arm": _arm_keys, "base": _base_keys}
     return [
-        Resource(key, addresses[device])
+        Resource(key, addresses[device], device)
         for device in real
         for key in (
             finders[device](addresses[device])
@@ -58,8 +60,8 @@ class DeviceLocks:
         """Acquire them. Raises EnvironmentFault if another run holds one or a lock's file cannot be opened."""
         self._fds: list[int] = []
         try:
-            for key, address in dict(resources_of(rig)).items():
-                self._fds.append(_lock(key, address, rig.name))
+            for resource in {found.key: found for found in resources_of(rig)}.values():
+                self._fds.append(_lock(resource, rig.name))
         except BaseException:
             self._release()
             raise
@@ -76,9 +78,45 @@ class DeviceLocks:
         self._fds = []
 
 
-def _lock(key: str, address: str, rig_name: str) -> int:
-    """Return the descriptor that holds the lock."""
-    path = state_dir() / f"{hashlib.sha256(key.encode()).hexdigest()[:24]}.lock"
+class FreeDevices:
+    """The locks of those real devices of a rig that no run holds; `held` says, for the others, who does."""
+
+    def __init__(self, rig: RigConfig) -> None:
+        """Acquire them. Raises EnvironmentFault if a lock's file cannot be opened."""
+        self.held: dict[str, str] = {}
+        self._fds: list[int] = []
+        try:
+            for resource in {found.key: found for found in resources_of(rig)}.values():
+                try:
+                    self._fds.append(_lock(resource, rig.name))
+                except InUse as error:
+                    self.held[resource.device] = error.holder
+        except BaseException:
+            self.__exit__()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for fd in self._fds:
+            os.close(fd)
+        self._fds = []
+
+
+class InUse(EnvironmentFault):
+    """Another run holds the lock: `holder` says which."""
+
+    def __init__(self, holder: str, where: str) -> None:
+        super().__init__(
+            f"in use by another run ({holder})", where=where, do="Wait for it, or stop it with Ctrl-C in its terminal"
+        )
+        self.holder = holder
+
+
+def _lock(resource: Resource, rig_name: str) -> int:
+    """Return the descriptor that holds the lock. Raises InUse, EnvironmentFault."""
+    path = state_dir() / f"{hashlib.sha256(resource.key.encode()).hexdigest()[:24]}.lock"
     try:
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     except OSError as error:
@@ -90,9 +128,7 @@ def _lock(key: str, address: str, rig_name: str) -> int:
     except BlockingIOError:
         who = _holder(fd)
         os.close(fd)
-        raise EnvironmentFault(
-            f"in use by another run ({who})", where=address, do="Wait for it, or stop it with Ctrl-C in its terminal"
-        ) from None
+        raise InUse(who, resource.address) from None
     os.ftruncate(fd, 0)
     os.pwrite(fd, msgspec.json.encode(Holder(os.getpid(), rig_name)), 0)
     return fd

@@ -49,6 +49,10 @@ RING_BYTES = {"control": 32 << 20, "gate": 8 << 20, "world": 8 << 20}
 """Room for about two minutes without a drain by the recorder."""
 
 
+MOST_DESCRIPTORS = 128
+"""Files and sockets that any process of a run has open at the same time, with room to spare."""
+
+
 class Processes:
     """Starts the processes of one run, by `start_emulators` and `start_remaining`; `children` has them by name.
 

@@ -24,8 +24,13 @@ def arm_pose_notes(rig: RigConfig, figures: dict[str, Any]) -> list[str]:
     ]
 
 
+def whole_turns(off_rad: float) -> int:
+    """Return by how many whole turns a joint is off, to the nearest."""
+    return round(off_rad / math.tau)
+
+
 def _apart(off: float, tolerance: float) -> str:
-    turns = round(off / math.tau)
+    turns = whole_turns(off)
     if turns and abs(off - turns * math.tau) <= tolerance:
         whole = "one whole turn" if abs(turns) == 1 else f"{abs(turns)} whole turns"
         return f"{whole} away, so it looks right; turn it back at the teach pendant (its cable is wound up)"

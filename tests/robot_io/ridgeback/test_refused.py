@@ -13,6 +13,8 @@ def test_a_topic_whose_messages_were_refused_is_told_so():
     error = refused.explain(["/base_pose", "/odometry/filtered"], "ws://there", 2.0)
     assert isinstance(error, DeviceProtocolError)
     assert error.what == "messages on /odometry/filtered arrived but could not be read (JSON is malformed)"
+    assert refused.reason_of("/odometry/filtered") == "JSON is malformed"
+    assert refused.reason_of("/odometry") == ""
 
 
 def test_a_topic_that_stayed_silent_is_told_so():

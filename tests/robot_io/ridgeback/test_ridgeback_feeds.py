@@ -49,6 +49,16 @@ def test_a_pose_in_another_frame_than_the_first_is_flawed():
     assert reader.counters["pose_flawed"] == 2
 
 
+def test_the_frame_of_the_first_pose_is_told():
+    reader = FeedReader(TOPICS, "mocap", Pose2D())
+    assert reader.pose_frame == ""
+    for frame in ("/world", "/map"):
+        reader.read(vicon(frame), 0)
+    assert reader.pose_frame == "/world"
+    reader.reset()
+    assert reader.pose_frame == ""
+
+
 def test_the_frame_that_a_rig_names_counts_from_the_first_message_on():
     reader = FeedReader(TopicsConfig(base_pose="/vicon/a/a", world_frame="/map"), "mocap", Pose2D())
     assert "expected 'vicon/a/a' in '/map'" in poses(reader, vicon())[0].flaw

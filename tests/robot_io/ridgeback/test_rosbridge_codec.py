@@ -13,6 +13,7 @@ from robot_io.ridgeback.rosbridge_codec import (
     ServiceAnswer,
     decode_frame,
     decode_subscribers,
+    decode_time,
     decode_topic_type,
     encode_advertise,
     encode_call,
@@ -275,3 +276,16 @@ def test_yaw_of_quaternions():
     assert yaw_from_quaternion(0, 0, 0, 0) is None
     assert yaw_from_quaternion(0, 0, 0, math.nan) is None
     assert wrap_angle(-math.pi) == math.pi
+
+
+@pytest.mark.parametrize("names", [("secs", "nsecs"), ("sec", "nanosec")])
+def test_the_robots_time_in_either_ros(names):
+    whole, part = names
+    values = json.dumps({"time": {whole: 1795312357, part: 250000000}}).encode()
+    assert decode_time(values) == 1795312357.25
+
+
+@pytest.mark.parametrize("values", ["{}", '{"time": 3}', '"Service does not exist"', '{"time": {"secs": 1.5}}'])
+def test_what_is_no_time_is_refused(values):
+    with pytest.raises(ValueError):
+        decode_time(values.encode())

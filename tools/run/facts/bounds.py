@@ -44,8 +44,8 @@ def bounds_lines(rig: RigConfig) -> list[str]:
     lines = [
         _motion_line(total_bounds(rig)),
         in_words(phase_bounds(rig)),
-        _workspace_line(rig),
-        _stopping_line(stopping(rig, FAULTS.values())),
+        workspace_line(rig),
+        stopping_line(stopping(rig, FAULTS.values())),
     ]
     if rig.base.pose_source == "odometry":
         lines.append("the pose is odometry, so it cannot be checked against it")
@@ -95,7 +95,8 @@ def _motion_line(most: TravelLimits) -> str:
     )
 
 
-def _workspace_line(rig: RigConfig) -> str:
+def workspace_line(rig: RigConfig) -> str:
+    """Return where the base may be, in words."""
     given = rig.workspace
     if given.x_m is not None and given.y_m is not None:
         (left, right), (low, high) = given.x_m, given.y_m
@@ -108,7 +109,8 @@ def _workspace_line(rig: RigConfig) -> str:
     )
 
 
-def _stopping_line(found: Stopping) -> str:
+def stopping_line(found: Stopping) -> str:
+    """Return the distances to rest, in words."""
     return (
         f"stopping distance at {found.speed_m_per_s:g} m/s: {found.stop_m * 100:.1f} cm after a stop, "
         f"{found.alone_m * 100:.1f} cm if this computer dies, {found.slowest_m * 100:.1f} cm after the slowest fault "

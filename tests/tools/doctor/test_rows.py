@@ -1,0 +1,99 @@
+"""Rows that no emulator can cause: a forbidden port, a timer that the system names, this machine, the rig."""
+
+import os
+import pty
+import resource
+import shutil
+from types import SimpleNamespace
+
+import pytest
+
+from tools.doctor import ft_checks, host_checks
+from tools.doctor.host_checks import host_checks as check_host
+from tools.doctor.rig_checks import rig_checks
+from tools.rig import resolve_rig
+
+
+def by_name(checks):
+    return {check.check: check for check in checks}
+
+
+@pytest.fixture
+def port():
+    master, slave = pty.openpty()
+    yield os.ttyname(slave)
+    os.close(master)
+    os.close(slave)
+
+
+def sensor_at(port):
+    return resolve_rig("emulated", ["ft.level=hardware", f"ft.port={port}"])
+
+
+def test_a_port_that_may_not_be_opened(port, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    rows = by_name(ft_checks.ft_checks(sensor_at(port)))
+    assert rows["ft.permission"].result == "failed"
+    assert "dialout" in rows["ft.permission"].fix
+    assert rows["ft.identity"].result == "skipped"
+
+
+def test_a_port_that_is_no_device(tmp_path):
+    (tmp_path / "file").touch()
+    assert by_name(ft_checks.ft_checks(sensor_at(tmp_path / "file")))["ft.port"].result == "failed"
+
+
+@pytest.mark.parametrize(("told_ms", "result"), [(1, "ok"), (16, "warning")])
+def test_a_timer_that_the_system_names_is_believed(port, monkeypatch, told_ms, result):
+    monkeypatch.setattr(ft_checks, "latency_timer_ms", lambda _port: told_ms)
+    rows = ft_checks.Rows("ft")
+    ft_checks._latency(rows, port, None, None)
+    row = by_name(rows.all(""))["ft.latency-timer"]
+    assert (row.result, row.value, row.limit, row.unit) == (result, float(told_ms), 1.0, "ms")
+    assert ("udev" in row.fix) is (result == "warning")
+
+
+def host(monkeypatch, **overrides):
+    settings = [f"loop.rate_hz={overrides.pop('rate_hz', 100)}"]
+    return by_name(check_host(resolve_rig("emulated", settings)))
+
+
+@pytest.mark.parametrize(("rate_hz", "result"), [(100, "warning"), (250, "failed")])
+def test_without_real_time_only_100_hz(monkeypatch, rate_hz, result):
+    monkeypatch.setattr(host_checks, "try_realtime", lambda _priority: False)
+    assert host(monkeypatch, rate_hz=rate_hz)["host.scheduling"].result == result
+
+
+def test_too_few_files(monkeypatch):
+    monkeypatch.setattr(resource, "getrlimit", lambda _which: (64, 64))
+    assert host(monkeypatch)["host.limits"].result == "failed"
+
+
+def test_a_full_disk(monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=1_000_000))
+    assert host(monkeypatch)["host.disk"].result == "failed"
+
+
+def test_a_machine_that_could_fall_asleep(monkeypatch, tmp_path):
+    monkeypatch.setattr(host_checks, "SYSTEMD", tmp_path)
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
+    assert host(monkeypatch)["host.suspend"].result == "warning"
+
+
+@pytest.mark.parametrize(
+    ("settings", "check", "result"),
+    [
+        (["workspace.x_m=[-1.6, 0.5]", "workspace.y_m=[-1, 1]"], "rig.workspace", "failed"),
+        (["workspace.x_m=[-4, 9]", "workspace.y_m=[-0.8, 0.8]"], "rig.corridor", "warning"),
+        (["workspace.x_m=[-4, 9]", "workspace.y_m=[-1.5, 1.5]"], "rig.corridor", "ok"),
+        (["goal.end_tolerance_m=0.6"], "rig.corridor", "warning"),
+        (["control.push_speed_m_per_s=0.5"], "rig.stopping-distance", "warning"),
+        (["control.k_f=0.1", "control.k_y_rad_per_m=0.3"], "rig.gains", "warning"),
+        ([], "rig.gains", "ok"),
+        ([], "rig.calibration-age", "warning"),
+    ],
+)
+def test_what_the_rig_says_of_itself(settings, check, result):
+    row = by_name(rig_checks(resolve_rig("emulated", settings)))[check]
+    assert row.result == result, row
+    assert bool(row.fix) == (result != "ok")

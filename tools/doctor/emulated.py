@@ -1,0 +1,137 @@
+"""The emulators that doctor looks at, in a process of their own: `python -m tools.doctor.emulated` (job on stdin)."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+
+import msgspec
+from msgspec.structs import replace
+
+from robot_io.clock import monotonic_ns
+from robot_io.errors import ConfigError, EnvironmentFault, PushError
+from robot_io.ipc.event_loop import EventLoop
+from robot_io.ipc.process import die_with_parent, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.spawn import spawn
+from robot_io.ipc.status import StatusPipe
+from robot_io.rig.config import RigConfig, rig_from_toml, rig_to_toml
+from robot_io.rig.fault_words import WHERE
+from sim_backend.ft300.emulator import Ft300Emulator
+from sim_backend.injection.wire_arm import spoil_arm
+from sim_backend.injection.wire_base import spoil_base
+from sim_backend.injection.wire_sensor import spoil_sensor
+from sim_backend.injection.wire_words import parse_wire_fault
+from sim_backend.ridgeback.emulator import RosbridgeEmulator
+from sim_backend.ur10.emulator import UrEmulator
+from sim_backend.world.world import World
+from tools.kinds import is_shipped
+from tools.rig import devices_at, kinds_of
+from tools.run.emulators import Emulator, address_of, open_emulator
+
+READY_WITHIN_S = 20.0
+ENDS_WITHIN_S = 2.0
+PRIORITY = 70
+
+
+class EmulatedJob(msgspec.Struct, frozen=True):
+    """What to serve."""
+
+    rig_toml: str
+    kind_folder: str
+    devices: tuple[str, ...]
+    faults: tuple[str, ...]
+    parent_pid: int
+    status_fd: int = -1
+
+
+@contextlib.contextmanager
+def emulators(rig: RigConfig, kind_folder: str, faults: Sequence[str]) -> Iterator[RigConfig]:
+    """Serve the rig's devices at level emulated; give the rig with their addresses.
+
+    faults: what is wrong with them, in words. Raises PushError where they cannot be served.
+    """
+    check_faults(rig, faults)
+    devices = tuple(devices_at(rig, "emulated"))
+    if not devices:
+        yield rig
+        return
+    job = EmulatedJob(rig_to_toml(rig), kind_folder, devices, tuple(faults), os.getpid())
+    child = spawn("emulators", "tools.doctor.emulated", job, [])
+    try:
+        if not child.wait_ready(READY_WITHIN_S):
+            if child.errors:
+                raise child.errors[0]
+            child.stop(ENDS_WITHIN_S)
+            raise EnvironmentFault(f"the emulators did not start: {child.how_it_ended()}")
+        yield with_addresses(rig, (child.ready or {})["addresses"])
+    finally:
+        child.stop(ENDS_WITHIN_S)
+        child.close()
+
+
+def with_addresses(rig: RigConfig, addresses: dict[str, str]) -> RigConfig:
+    """Return the rig with the addresses of its emulators filled in."""
+    if "ft" in addresses:
+        rig = replace(rig, ft=replace(rig.ft, port=addresses["ft"]))
+    if "arm" in addresses:
+        rig = replace(rig, arm=replace(rig.arm, host=addresses["arm"]))
+    if "base" in addresses:
+        rig = replace(rig, base=replace(rig.base, url=addresses["base"]))
+    return rig
+
+
+def spoil(loop: EventLoop, opened: Mapping[str, Emulator], faults: Sequence[str], rig: RigConfig) -> None:
+    """Let the emulators do wrong what `faults` say."""
+    words = [parse_wire_fault(text) for text in faults]
+    for device, emulator in opened.items():
+        mine = [fault for fault in words if fault.device.partition(".")[0] == device]
+        if isinstance(emulator, Ft300Emulator):
+            spoil_sensor(emulator, mine, rig)
+        elif isinstance(emulator, UrEmulator):
+            spoil_arm(emulator, mine)
+        elif isinstance(emulator, RosbridgeEmulator):
+            spoil_base(loop, emulator, mine, rig)
+
+
+def check_faults(rig: RigConfig, faults: Sequence[str]) -> None:
+    """Raise ConfigError for a fault that cannot be read, or that no emulated device of the rig can do."""
+    for text in faults:
+        device = parse_wire_fault(text).device.partition(".")[0]
+        if device not in devices_at(rig, "emulated") or not is_shipped(device, kinds_of(rig)[device]):
+            raise ConfigError(
+                f"`{text}`: {device} is not emulated by this program in rig {rig.name!r}",
+                where=WHERE,
+                do="Use the rig `emulated`",
+            )
+
+
+def main() -> int:
+    """Serve until SIGTERM; return the exit code."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    job = msgspec.json.decode(sys.stdin.buffer.read(), type=EmulatedJob)
+    die_with_parent(job.parent_pid, signal.SIGTERM)
+    set_timer_slack_1ns()
+    status = StatusPipe(job.status_fd)
+    rig = rig_from_toml(job.rig_toml)
+    loop = EventLoop()
+    opened: dict[str, Emulator] = {}
+    try:
+        world = World(rig, 0, monotonic_ns())
+        for device in job.devices:
+            opened[device] = open_emulator(loop, world, rig, device, job.kind_folder)
+    except PushError as error:
+        status.error(error)
+        return error.exit_code
+    addresses = {device: address_of(emulator) for device, emulator in opened.items()}
+    spoil(loop, opened, job.faults, rig)
+    try_realtime(PRIORITY)
+    status.say("ready", addresses=addresses)
+    loop.run()  # SIGTERM ends the process: its ports and sockets go with it
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
