@@ -53,6 +53,11 @@ def test_exit():
 """
 LONG_TEST = "import pytest\n@pytest.mark.long\ndef test_long():\n    assert False\n"
 """A file of long tests only, none of which `make test` runs."""
+PYTEST_SETTINGS = """[tool.pytest.ini_options]
+pythonpath = ["."]
+addopts = "--import-mode=importlib -m 'not long'"
+markers = ["long"]
+"""
 MORE = "def test_more():\n    assert clamp(2) == 2\n    assert count(0) and count(6) and count(1)\n"
 
 
@@ -74,7 +79,7 @@ def project(tmp_path):
         "tests/test_shell.py": SHELL_TEST,
         "tests/control/test_long.py": LONG_TEST,
         "tests/mutants_equivalent.toml": "",
-        "pyproject.toml": '[tool.pytest.ini_options]\npythonpath = ["."]\naddopts = "--import-mode=importlib -m \'not long\'"\nmarkers = ["long"]\n',
+        "pyproject.toml": PYTEST_SETTINGS,
         ".gitignore": ".mutants/\n",
     }.items():
         (tmp_path / file).write_text(text)
