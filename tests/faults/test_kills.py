@@ -138,9 +138,9 @@ def test_recorder_killed(state, tmp_path, host):
 
 
 def wait_for_only(run, pids, left, within_s):
-    """Wait until no process of a run but `left` lives."""
+    """Wait until no process of a run but those of `left` (with a space between) lives."""
     deadline_s = time.monotonic() + within_s
-    while others := {name for name, pid in pids.items() if pid in run.alive() and name != left}:
+    while others := {name for name, pid in pids.items() if pid in run.alive() and name not in left.split()}:
         assert time.monotonic() < deadline_s, f"still alive: {others}"
         time.sleep(0.05)
 
@@ -166,6 +166,27 @@ def test_launcher_frozen(state, tmp_path, host):
     assert 390.0 < (first["F73-hold"] - frozen_ns) / 1e6 < 530.0
     assert 1890.0 < (first["F73-stop"] - frozen_ns) / 1e6 < 2030.0
     assert stands(world_of(log)[1][-1][1])
+    replays(tmp_path / "run")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("frozen", ["control launcher", "control gate launcher"])
+@repeated_when_the_host_stalls
+def test_several_frozen_at_once(state, tmp_path, host, frozen):
+    """5 s after rest nothing lives but the frozen ones, which find their run ended when they go on."""
+    with pushing(state, tmp_path / "run", host) as (run, pids):
+        for name in frozen.split():
+            os.kill(pids[name], STOP)
+        wait_for_only(run, pids, frozen.replace("control", ""), 0.35 + 5.0)
+        for name in frozen.split()[1:]:
+            os.kill(pids[name], signal.SIGCONT)
+        ended = run.wait(10.0)
+        run.wait_gone(3.0)
+    assert ended.code == 5, ended.err
+    assert "the control process was killed" in ended.err
+    # A gate that is frozen, too, writes nothing any more: the base then stops by its own timeout.
+    assert ended.last_object["faults"] == ([] if "gate" in frozen else ["F66"])
+    assert stands(world_of(tmp_path / "run" / "run.mcap")[1][-1][1])
     replays(tmp_path / "run")
 
 

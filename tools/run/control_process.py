@@ -18,12 +18,14 @@ from control.notes.run_notes import outcome
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.driver import Sensor
 from robot_io.errors import EnvironmentFault, PushError
+from robot_io.ipc.deadman import Deadman
 from robot_io.ipc.gate_link import GateLink
 from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
 from robot_io.rig.config import rig_from_toml
+from robot_io.tick import TickInput, TickOutput, TickState
 from robot_io.ur10.driver import ArmLink
 from sim_backend.injection.arm import InjectedArm
 from sim_backend.injection.event import event_writer
@@ -39,6 +41,9 @@ VERDICT_WITHIN_S = 3.0
 """How long a launcher on a busy machine may take to read the result; the base is already at rest."""
 LAUNCHER_SILENT_S = 2.0
 """A launcher that was silent for this long before the start is frozen, and nobody holds the operator's keys."""
+
+FROZEN_S = 2
+"""A loop that has stood still for this long is killed, or a launcher frozen with it would leave the others waiting."""
 
 
 class DriverWarnings(logging.Handler):
@@ -73,6 +78,12 @@ def main() -> int:
     core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = GateLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     arm = ArmLink(job.arm_record_fd)
+    deadman = Deadman(FROZEN_S)
+
+    def on_status(inp: TickInput, state: TickState, output: TickOutput) -> None:
+        deadman.renew()
+        status.say("status", **status_line(inp, state, output))
+
     watch = Watch(gate=job.gate_pidfd, arm=job.arm_pidfd, recorder=job.recorder_pidfd)
     loop = ControlLoop(
         core.fold,
@@ -85,7 +96,7 @@ def main() -> int:
         ring=ring,
         watch=watch,
         operator_fd=job.operator_fd,
-        on_status=lambda inp, state, output: status.say("status", **status_line(inp, state, output)),
+        on_status=on_status,
     )
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     try:
@@ -110,6 +121,7 @@ def main() -> int:
     lock_memory()
     injection.begin(monotonic_ns() + round(NS_PER_S / rig.loop.rate_hz))
     loop.run()
+    deadman.release()
     base.close()  # first: the gate reads the EOF as the end and sends its last zeros
     gc.enable()
     return _finish(loop, sensor, status, rig.loop.rate_hz, injection.counts("ft", "arm"))
