@@ -14,7 +14,7 @@ import select
 import sys
 from collections.abc import Sequence
 from types import ModuleType
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from robot_io.error_report import discard_stdout, ignoring_output_errors, report, unexpected
 from robot_io.errors import EnvironmentFault, OperatorStop, PushError, UsageError
@@ -99,7 +99,13 @@ COMMANDS = {
 
 
 class Parser(argparse.ArgumentParser):
-    """An argparse parser that raises instead of exiting, so that `--json` also covers usage errors."""
+    """An argparse parser that raises instead of exiting, so that `--json` also covers usage errors.
+
+    Neither it nor those of its actions take abbreviations: a new option would change what they mean.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings, allow_abbrev=False)
 
     def error(self, message: str) -> NoReturn:
         """Raise UsageError with argparse's message."""
@@ -151,7 +157,6 @@ def parser_of(name: str, module: ModuleType) -> Parser:
         description=f"{command.summary[0].upper()}{command.summary[1:]}.",
         epilog="examples:\n" + "\n".join(f"  {example}" for example in command.examples),
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     module.add_arguments(parser)
     return parser

@@ -10,6 +10,7 @@ import msgspec
 from robot_io.error_report import SCHEMA, say_json, tell
 from robot_io.rig.config import rig_to_toml, shipped_rigs
 from tools.rig import resolve_rig
+from tools.terminal.arguments import name_or_path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +18,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "action", choices=("show", "check"), help="show: print every value; check: only report whether it is valid"
     )
-    parser.add_argument("rig", nargs="?", default="emulated", help=f"{', '.join(shipped_rigs())}, or a path (emulated)")
+    parser.add_argument(
+        "rig",
+        nargs="?",
+        type=name_or_path,
+        default="emulated",
+        help=f"{', '.join(shipped_rigs())}, or a path (emulated)",
+    )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one value, repeatable")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
 

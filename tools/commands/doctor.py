@@ -15,11 +15,14 @@ from tools.doctor.examine import looked_at
 from tools.doctor.find import adapter_lines
 from tools.places.device_locks import FreeDevices
 from tools.rig import folder_of, resolve_rig
+from tools.terminal.arguments import name_or_path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push doctor`."""
-    parser.add_argument("rig", nargs="?", default="emulated", help="a shipped rig or a TOML file (default: emulated)")
+    parser.add_argument(
+        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
+    )
     parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
     parser.add_argument(
         "--fault",

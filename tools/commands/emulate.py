@@ -27,6 +27,7 @@ from sim_backend.ur10.standalone import StillArm
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
 from tools.run.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
+from tools.terminal.arguments import name_or_path
 
 ARM_HOST = "127.0.0.10"
 BASE_HOST = "127.0.0.1"
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the devices and their flags."""
     devices = parser.add_subparsers(dest="device", required=True, metavar="DEVICE")
 
-    ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty", allow_abbrev=False)
+    ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty")
     wrench = "FX,FY,FZ,MX,MY,MZ"
     ft.add_argument("--wrench", default="0,0,0,0,0,0", metavar=wrench, help="N, N*m; as in --wrench=-10,0,0,0,0,0")
     ft.add_argument("--step-after-s", type=float, metavar="S", help="change to --step-wrench this long after the start")
@@ -49,20 +50,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     ft.set_defaults(open_devices=_open_ft300)
 
-    ur = devices.add_parser(
-        "ur10", help="UR10 controller (RTDE, scripts, dashboard) standing still", allow_abbrev=False
-    )
+    ur = devices.add_parser("ur10", help="UR10 controller (RTDE, scripts, dashboard) standing still")
     ur.add_argument("--host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST}); one robot per address")
     ur.set_defaults(open_devices=_open_ur10)
 
-    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server", allow_abbrev=False)
+    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server")
     base.add_argument("--host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
     base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")
     base.set_defaults(open_devices=_open_ridgeback)
 
-    everything = devices.add_parser("all", help="all three on one simulated world", allow_abbrev=False)
+    everything = devices.add_parser("all", help="all three on one simulated world")
     everything.add_argument(
-        "rig", nargs="?", default="emulated", help="whose world: a shipped name or a path (emulated)"
+        "rig", nargs="?", type=name_or_path, default="emulated", help="whose world: a shipped name or a path (emulated)"
     )
     everything.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig"

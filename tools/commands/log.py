@@ -22,6 +22,7 @@ from robot_io.mcap.read import LogSummary, read_summary
 from tools.log.decode import Decoders, columns
 from tools.places.find_log import find_log
 from tools.places.stream_file import as_file, is_stream
+from tools.terminal.arguments import named_path
 
 STANDARD_INPUT = Path("/dev/stdin")
 DO_OTHER_TOOL = "Read it with the tool that wrote it; `push log info` lists all topics that cannot be read here"
@@ -35,15 +36,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     export = actions.add_parser("export", help="write one CSV file per topic, units in the header line")
     saved = actions.add_parser("recover", help="repair a truncated log")
     for action in (info, cat, export, saved):
-        action.add_argument("log", type=Path, help="run.mcap, a run's folder, or - for a pipe")
+        action.add_argument("log", type=named_path, help="run.mcap, a run's folder, or - for a pipe")
         action.add_argument("--json", action="store_true", help="one JSON object on stdout, last")
     for action in (cat, export):
         action.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these topics")
     export.add_argument(
-        "--out", type=Path, metavar="DIR", help="directory for the tables (default: LOG without .mcap, plus _csv)"
+        "--out", type=named_path, metavar="DIR", help="directory for the tables (default: LOG without .mcap, plus _csv)"
     )
     saved.add_argument(
-        "--out", type=Path, metavar="FILE", help="the new log (default: LOG without .mcap, plus _recovered.mcap)"
+        "--out", type=named_path, metavar="FILE", help="the new log (default: LOG without .mcap, plus _recovered.mcap)"
     )
 
 

@@ -19,13 +19,14 @@ from tools.replay.verified_log import VerifiedLog
 from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
 from tools.run.facts.run_facts import code_and_machine
 from tools.run.tick_core import TickCore
+from tools.terminal.arguments import named_path
 
 DIFFERS = ReplayDiffers.exit_code
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push replay`."""
-    parser.add_argument("log", help="run.mcap, or a run's folder")
+    parser.add_argument("log", type=named_path, help="run.mcap, or a run's folder")
     parser.add_argument(
         "--what-if", action="append", default=[], metavar="KEY=VALUE", help="re-run the same inputs with other settings"
     )
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay; return 0 if identical, 7 if different. Raises LogDamaged (8) for a log that cannot be trusted."""
-    path = find_log(Path(args.log))
+    path = find_log(args.log)
     if args.tolerance is not None and not args.tolerance >= 0.0:
         raise UsageError(f"--tolerance {args.tolerance} is not a tolerance", where="push replay", do="Give 0 or more")
     if args.what_if:

@@ -8,17 +8,20 @@ from pathlib import Path
 from robot_io.error_report import SCHEMA, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from tools.places.find_log import find_log
+from tools.terminal.arguments import named_path
 
 PNG_NAMES = ("trajectory", "force", "speed", "tracking", "timing", "safety")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push report`."""
-    parser.add_argument("log", nargs="+", type=Path, help="run.mcap, or a run's folder; several with --compare")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for report.html (default: beside the log)")
+    parser.add_argument("log", nargs="+", type=named_path, help="run.mcap, or a run's folder; several with --compare")
+    parser.add_argument(
+        "--out", type=named_path, metavar="DIR", help="folder for report.html (default: beside the log)"
+    )
     parser.add_argument("--png", action="store_true", help="also write the figures as PNG files")
     parser.add_argument(
-        "--compare", type=Path, metavar="PNG", help="draw the plan view of all logs into this new picture"
+        "--compare", type=named_path, metavar="PNG", help="draw the plan view of all logs into this new picture"
     )
     parser.add_argument("--json", action="store_true", help="the paths written, as one line of JSON, last on stdout")
 

@@ -23,6 +23,7 @@ from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
+from tools.terminal.arguments import name_or_path, named_path
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
 from tools.verdict.arm_pose import arm_pose_notes
@@ -35,13 +36,17 @@ MAX_SEED = 2**63 - 1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push run`."""
-    parser.add_argument("rig", nargs="?", default="emulated", help="a shipped rig or a TOML file (default: emulated)")
+    parser.add_argument(
+        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
+    )
     parser.add_argument("--distance-m", type=float, help="how far to push, from first contact")
     parser.add_argument(
         "--controller", choices=("force", "open-loop"), help="force (the pushing law) or open-loop (straight ahead)"
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the simulated world (0)")
-    parser.add_argument("--out", help="folder for the run, created (default: runs/RIG-TIME)")
+    parser.add_argument(
+        "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
+    )
     parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
     parser.add_argument(
         "--fault",

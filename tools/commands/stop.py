@@ -18,6 +18,7 @@ from tools.kinds import is_shipped
 from tools.places.device_locks import resources_of
 from tools.places.running import RunningRun, running_runs
 from tools.rig import devices_at, folder_of, resolve_rig
+from tools.terminal.arguments import name_or_path
 
 STOPS_WITHIN_S = 4.0
 """A run that was asked to stop: at most 1.5 s until it calls its base at rest, and its processes end."""
@@ -30,7 +31,9 @@ MOVERS = ("control", "gate")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags."""
-    parser.add_argument("rig", nargs="?", help="only runs of this rig or with its devices: a name or a path (all)")
+    parser.add_argument(
+        "rig", nargs="?", type=name_or_path, help="only runs of this rig or with its devices: a name or a path (all)"
+    )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one value, repeatable")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
 

@@ -17,12 +17,17 @@ from tools.study.engine import default_workers, engine, run_items
 from tools.study.grid import load_grid
 from tools.study.paper import paper_study
 from tools.study.plan import Plan, hardware_plan, lanes_plan
+from tools.terminal.arguments import name_or_path, named_path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("grid", nargs="?", default="paper", help="paper (default), hardware, or a TOML grid file")
-    parser.add_argument("--out", help="folder for the results (default: sweeps/NAME-TIME)")
+    parser.add_argument(
+        "grid", nargs="?", type=name_or_path, default="paper", help="paper (default), hardware, or a TOML grid file"
+    )
+    parser.add_argument(
+        "--out", type=named_path, metavar="DIR", help="folder for the results (default: sweeps/NAME-TIME)"
+    )
     parser.add_argument("--resume", action="store_true", help="continue the study in --out, skipping finished parts")
     parser.add_argument("--gains", metavar="K_F,K_Y", help="gains for all cases, for example --gains=0.1,0.3")
     parser.add_argument("--open-loop", action="store_true", help="push straight along the path in all cases")
@@ -44,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--workers {workers} is not possible", do="Give at least 1")
     if args.resume and not args.out:
         raise UsageError("--resume needs the folder of the study to continue", do="Add --out DIR")
-    out = Path(args.out) if args.out else Path("sweeps") / f"{plan.name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    out = args.out or Path("sweeps") / f"{plan.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     with _terminate_as_interrupt(), engine(args.engine, args.scheduler):
         store = Store(out, plan.name, fingerprint(plan.definition, plan.sources), resume=args.resume)
         finished = store.finished(len(plan.items))

@@ -29,6 +29,7 @@ from sim_backend.physics.gain_limits import (
 )
 from sim_backend.physics.slider import Circle, Pressure, Rectangle
 from tools.study.tune_map import PRESETS
+from tools.terminal.arguments import named_path
 
 Choice = TypeVar("Choice", bound=str)
 SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
@@ -70,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--k-f", type=float, default=0.3, metavar="K_F", help="k_f to recommend a k_y for (default: 0.3)"
     )
-    parser.add_argument("--out", help="folder for the map (default: sweeps/tune-TIME)")
+    parser.add_argument("--out", type=named_path, metavar="DIR", help="folder for the map (default: sweeps/tune-TIME)")
     parser.add_argument("--no-check", action="store_true", help="skip the simulations")
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
 
@@ -222,17 +223,17 @@ def _draw(bodies: Sequence[PushedBody], recommended: tuple[float, float], what: 
     return save(draw([(f, limit(bodies, f)) for f in k_f], recommended, what), out, "gain_map")
 
 
-def _folder(out: str | None) -> Path:
-    path = Path(out) if out else Path("sweeps") / f"tune-{time.strftime('%Y%m%d-%H%M%S')}"
+def _folder(out: Path | None) -> Path:
+    folder = out or Path("sweeps") / f"tune-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
-        if path.exists() and any(path.iterdir()):
-            raise UsageError("this folder is not empty", where=str(path), do="Give another --out")
-        path.mkdir(parents=True, exist_ok=True)
+        if folder.exists() and any(folder.iterdir()):
+            raise UsageError("this folder is not empty", where=str(folder), do="Give another --out")
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(
-            f"this folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
+            f"this folder cannot be written: {error.strerror}", where=str(folder), do="Give another --out"
         ) from None
-    return path
+    return folder
 
 
 def _range_samples(text: str, where: str) -> list[float]:

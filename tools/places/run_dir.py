@@ -15,12 +15,12 @@ MAX_RUNS_PER_SECOND = 1000
 RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
 
 
-def create(out: str | None, rig_name: str) -> Path:
+def create(out: Path | None, rig_name: str) -> Path:
     """Create and return the run's folder (default: `runs/RIG-TIME`, with a number if that exists).
 
     Raises UsageError if it already holds a run or cannot be created.
     """
-    path = Path(out) if out else Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    path = out or Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
         if any((path / name).exists() for name in RUN_FILES) and out:
             raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")

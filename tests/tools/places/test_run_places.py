@@ -33,20 +33,20 @@ def test_runs_of_the_same_second_get_folders_of_their_own(tmp_path, monkeypatch)
 def test_a_folder_that_holds_anything_of_a_run_is_refused(tmp_path, name):
     (tmp_path / name).touch()
     with pytest.raises(UsageError, match="already holds a run"):
-        run_dir.create(str(tmp_path), "sim")
+        run_dir.create(tmp_path, "sim")
 
 
 def test_an_empty_folder_and_one_with_other_things_is_taken(tmp_path):
     (tmp_path / "notes.txt").touch()
-    assert run_dir.create(str(tmp_path), "sim") == tmp_path
+    assert run_dir.create(tmp_path, "sim") == tmp_path
     assert {path.name for path in tmp_path.iterdir()} == {"notes.txt"}
-    assert run_dir.create(str(tmp_path / "a" / "b"), "sim").is_dir()
+    assert run_dir.create(tmp_path / "a" / "b", "sim").is_dir()
 
 
 def test_a_folder_that_cannot_be_made_is_said(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(UsageError, match="cannot be written"):
-        run_dir.create(str(tmp_path / "file" / "below"), "sim")
+        run_dir.create(tmp_path / "file" / "below", "sim")
 
 
 def test_discard_takes_only_what_is_of_the_run(tmp_path):
