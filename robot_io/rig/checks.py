@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
@@ -16,6 +16,9 @@ import msgspec
 from robot_io.errors import ConfigError
 from robot_io.rig.renames import advice
 from robot_io.rig.toml import KeyPath, Origins
+
+ALIKE = 0.75
+"""How like a key elsewhere has to be (difflib's ratio) to be meant rather than one of the same table."""
 
 T = TypeVar("T", bound=msgspec.Struct)
 Origin = Callable[[KeyPath], str]
@@ -30,7 +33,8 @@ def build(kind: type[T], data: Mapping[str, Any], origins: Origins, name: str) -
     unknown key, missing key, wrong type, value out of range and number that is not finite.
     """
     mistakes: Mistakes = []
-    built = _build(kind, data, (), lambda path: _origin(path, origins, name), mistakes)
+    reader = _Reader(kind, lambda path: _origin(path, origins, name), mistakes)
+    built = reader.read(kind, data, ())
     if mistakes:
         if len(mistakes) == 1:
             where, what = mistakes[0]
@@ -48,30 +52,64 @@ def _origin(path: KeyPath, origins: Origins, name: str) -> str:
     return name
 
 
-def _build(
-    kind: type[msgspec.Struct], data: Mapping[str, Any], path: KeyPath, origin: Origin, mistakes: Mistakes
-) -> dict[str, Any]:
-    fields = {field.name: field for field in msgspec.structs.fields(kind)}
-    built: dict[str, Any] = {}
-    for key, value in data.items():
-        here = (*path, key)
-        if key not in fields:
-            dotted = ".".join(here)
-            what = advice(dotted) or f"unknown key `{dotted}`{_nearest(key, list(fields))}"
-            mistakes.append((origin(here), what))
-        elif _is_table(fields[key].type):
-            if isinstance(value, Mapping):
-                built[key] = _build(fields[key].type, value, here, origin, mistakes)
+class _Reader:
+    """Reads the tables of `root`, adding what is wrong to `mistakes`."""
+
+    def __init__(self, root: type[msgspec.Struct], origin: Origin, mistakes: Mistakes) -> None:
+        self._root, self._origin, self._mistakes = root, origin, mistakes
+
+    def read(self, kind: type[msgspec.Struct], data: Mapping[str, Any], path: KeyPath) -> dict[str, Any]:
+        """Return the keys of the table `path` that are right."""
+        fields = {field.name: field for field in msgspec.structs.fields(kind)}
+        built: dict[str, Any] = {}
+        for key, value in data.items():
+            here = (*path, key)
+            if key not in fields:
+                dotted = ".".join(here)
+                what = advice(dotted) or f"unknown key `{dotted}`{self._meant(here, value, list(fields))}"
+                self._note(here, what)
+            elif _is_table(fields[key].type):
+                if isinstance(value, Mapping):
+                    built[key] = self.read(fields[key].type, value, here)
+                else:
+                    self._note(here, f"`{'.'.join(here)}` is a table, not a value")
+            elif problem := _problem(fields[key].type, value):
+                self._note(here, f"`{'.'.join(here)}` = {_short(value)}: {problem}")
             else:
-                mistakes.append((origin(here), f"`{'.'.join(here)}` is a table, not a value"))
-        elif problem := _problem(fields[key].type, value):
-            mistakes.append((origin(here), f"`{'.'.join(here)}` = {_short(value)}: {problem}"))
+                built[key] = value
+        for key, field in fields.items():
+            if key not in data and field.required:
+                self._note(path, f"`{'.'.join((*path, key))}` is missing")
+        return built
+
+    def _note(self, path: KeyPath, what: str) -> None:
+        self._mistakes.append((self._origin(path), what))
+
+    def _meant(self, path: KeyPath, value: Any, known: list[str]) -> str:
+        """Return a hint: the keys that end like the unknown one, which stand in other tables, or else a near name."""
+        ending = path
+        while isinstance(value, Mapping) and len(value) == 1:
+            [(key, value)] = value.items()
+            ending = (*ending, key)
+        names = list(_names(self._root))
+        alike = difflib.get_close_matches(ending[-1], [name[-1] for name in names], n=1, cutoff=ALIKE)
+        if difflib.get_close_matches(path[-1], known, n=1, cutoff=ALIKE):
+            alike = []
+        for end in (*(ending[start:] for start in range(len(ending))), *((word,) for word in alike)):
+            found = [f"`{'.'.join(name)}`" for name in names if name[-len(end) :] == end]
+            if found:
+                return f", did you mean {' or '.join([', '.join(found[:-1]), found[-1]] if found[1:] else found)}?"
+        return _nearest(path[-1], known)
+
+
+def _names(kind: type[msgspec.Struct], path: KeyPath = ()) -> Iterator[KeyPath]:
+    """Yield the path of every value."""
+    for field in msgspec.structs.fields(kind):
+        here = (*path, field.name)
+        if _is_table(field.type):
+            yield from _names(field.type, here)
         else:
-            built[key] = value
-    for key, field in fields.items():
-        if key not in data and field.required:
-            mistakes.append((origin(path), f"`{'.'.join((*path, key))}` is missing"))
-    return built
+            yield here
 
 
 def _is_table(kind: Any) -> bool:

@@ -221,3 +221,21 @@ def test_defaults_are_the_agreed_ones():
     control = ControlConfig()
     assert (control.push_speed_m_per_s, control.k_f, control.k_y_rad_per_m) == (0.1, 0.3, 0.2)
     assert math.isclose(load_rig("emulated").loop.rate_hz, 100.0)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("k_f=0.1", "unknown key `k_f`, did you mean `control.k_f`?"),
+        ("direction_deg=3", "did you mean `path.direction_deg`?"),
+        ("topics.command=/x", "did you mean `base.topics.command`?"),
+        ("level=sim", "did you mean `ft.level`, `arm.level` or `base.level`?"),
+        ("control.direction_deg=3", "did you mean `path.direction_deg`?"),
+        ("kf=0.1", "did you mean `control.k_f`?"),
+        ("friktion=0.1", "unknown key `friktion`"),
+    ],
+)
+def test_a_bare_key_suggests_its_whole_name(setting, words):
+    with pytest.raises(ConfigError) as caught:
+        load_rig("emulated", [setting])
+    assert words in str(caught.value)
