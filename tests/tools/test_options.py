@@ -5,6 +5,7 @@ import importlib
 
 import pytest
 
+from robot_io import errors
 from tools import cli
 
 
@@ -25,6 +26,13 @@ OPTIONS = {
     for action in parser._actions
 }
 PATHS = [name for name in OPTIONS if name.split()[-1] in ("--out", "--compare", "log", "rig", "grid")]
+
+FOR_NUMBERS = ("M", "N", "S", "MU", "RATIO", "K_F", "X", "LOW,HIGH", "SEED", "K_F,K_Y")
+NUMBERS = [
+    name
+    for name, action in OPTIONS.items()
+    if not action.choices and (action.type in (int, float) or action.metavar in FOR_NUMBERS)
+]
 
 
 @pytest.mark.parametrize("words", PARSERS)
@@ -61,3 +69,36 @@ def test_a_user_who_is_not_there(tmp_path, monkeypatch, capsys):
     assert cli.main(["report", "a.mcap", "--out=~nobody-of-this-name/x"]) == 2
     assert "there is no user `nobody-of-this-name`" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("far", ["nan", "inf", "1e30", "-1e30", "none", ""])
+def test_every_number_has_a_range(name, far):
+    action = OPTIONS[name]
+    text = f"{far},{far}" if action.metavar in ("LOW,HIGH", "K_F,K_Y") else far
+    with pytest.raises((argparse.ArgumentTypeError, errors.UsageError), match=r" to \S*\d"):
+        action.type(text)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        "run --distance-m", "run --seed", "bench sim --distance-m", "replay --tolerance", "sweep --dt",
+        "sweep --workers", "sweep --gains", "emulate ft300 --step-after-s", "emulate all --seed", "tune --size-m",
+        "tune --width-m", "tune --ball-radius-m", "tune --push-height-m", "tune --floor-friction", "tune --anisotropy",
+        "tune --slide-force-N", "tune --k-f",
+    ],
+)  # fmt: skip
+def test_no_number_is_forgotten(option):
+    assert option in NUMBERS
+
+
+def test_a_length_beyond_its_range_is_one_sentence_with_the_range(capsys):
+    assert cli.main(["tune", "--size-m=300"]) == 2
+    assert "argument --size-m: `300` is not LOW,HIGH with both from 0.01 to 10" in capsys.readouterr().err
+    assert cli.main(["tune", "--size-m=0.3,300"]) == 2
+    assert "from 0.01 to 10" in capsys.readouterr().err
+    assert cli.main(["run", "sim", "--distance-m=3000"]) == 2
+    assert "argument --distance-m: `3000` is not a number from 0.001 to 1000" in capsys.readouterr().err
+    assert cli.main(["emulate", "all", "--seed=0.5"]) == 2
+    assert "argument --seed: `0.5` is not a whole number from 0 to 9223372036854775807" in capsys.readouterr().err

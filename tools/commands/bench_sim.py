@@ -18,7 +18,7 @@ from typing import Any
 
 from robot_io.clock import NS_PER_S
 from robot_io.error_report import say_json, tell
-from robot_io.errors import EnvironmentFault, UsageError
+from robot_io.errors import EnvironmentFault
 from robot_io.mcap.read import read_summary
 from robot_io.rig.config import rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick, TickState
@@ -27,6 +27,7 @@ from tools.log.tick_topics import TickTopics
 from tools.rig import resolve_rig
 from tools.run.lockstep import Lockstep, open_log
 from tools.run.tick_core import TickCore
+from tools.terminal.arguments import number
 
 ROUNDS = 5
 """The best of this many rounds counts."""
@@ -37,16 +38,14 @@ PUSH = "import sys; from robot_io._entry import main; sys.exit(main())"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("--distance-m", type=float, default=6.0, help="length of the push that is timed (6)")
+    parser.add_argument(
+        "--distance-m", type=number(0.1, 100), metavar="M", default=6.0, help="length of the push that is timed (6)"
+    )
     parser.add_argument("--json", action="store_true", help="the figures as one line of JSON, last on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and print the figures; return the exit code. Raises UsageError, EnvironmentFault."""
-    if not 0.1 <= args.distance_m <= 100.0:
-        raise UsageError(
-            f"--distance-m {args.distance_m} is out of range", where="push bench sim", do="Give 0.1 to 100"
-        )
+    """Measure and print the figures; return the exit code. Raises EnvironmentFault."""
     with tempfile.TemporaryDirectory(prefix="push-bench-") as folder:
         figures = time_process(Path(folder), args.distance_m) | time_tick_parts(Path(folder))
     figures = {key: float(f"{value:.4g}") for key, value in figures.items()}

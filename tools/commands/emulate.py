@@ -27,7 +27,7 @@ from sim_backend.ur10.standalone import StillArm
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
 from tools.run.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
-from tools.terminal.arguments import name_or_path
+from tools.terminal.arguments import SEED, name_or_path, number
 
 ARM_HOST = "127.0.0.10"
 BASE_HOST = "127.0.0.1"
@@ -42,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty")
     wrench = "FX,FY,FZ,MX,MY,MZ"
     ft.add_argument("--wrench", default="0,0,0,0,0,0", metavar=wrench, help="N, N*m; as in --wrench=-10,0,0,0,0,0")
-    ft.add_argument("--step-after-s", type=float, metavar="S", help="change to --step-wrench this long after the start")
+    ft.add_argument(
+        "--step-after-s", type=number(0, 86400), metavar="S", help="change to --step-wrench this long after the start"
+    )
     ft.add_argument("--step-wrench", metavar=wrench, help="as in --step-wrench=-20,0,0,0,0,0")
     ft.add_argument("--streaming", action="store_true", help="already streaming, as after a client that crashed")
     ft.add_argument(
@@ -66,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     everything.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig"
     )
-    everything.add_argument("--seed", type=int, default=0, help="varies the start and the noise (0)")
+    everything.add_argument("--seed", type=SEED, metavar="SEED", default=0, help="varies the start and the noise (0)")
     everything.add_argument("--arm-host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST})")
     everything.add_argument("--base-host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
     everything.add_argument("--base-port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")

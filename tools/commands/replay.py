@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_io.error_report import printable, say_json, tell
-from robot_io.errors import ReplayDiffers, UsageError
+from robot_io.errors import ReplayDiffers
 from robot_io.log.log_format import FORMAT_FACT
 from robot_io.rig.config import rig_from_toml, rig_to_toml
 from tools.places.find_log import find_log
@@ -19,7 +19,7 @@ from tools.replay.verified_log import VerifiedLog
 from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
 from tools.run.facts.run_facts import code_and_machine
 from tools.run.tick_core import TickCore
-from tools.terminal.arguments import named_path
+from tools.terminal.arguments import named_path, number
 
 DIFFERS = ReplayDiffers.exit_code
 
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--what-if", action="append", default=[], metavar="KEY=VALUE", help="re-run the same inputs with other settings"
     )
     parser.add_argument(
-        "--tolerance", type=float, metavar="X", help="accept differences up to X (log from another machine)"
+        "--tolerance", type=number(0, 1e6), metavar="X", help="accept differences up to X (log from another machine)"
     )
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
 
@@ -39,8 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Replay; return 0 if identical, 7 if different. Raises LogDamaged (8) for a log that cannot be trusted."""
     path = find_log(args.log)
-    if args.tolerance is not None and not args.tolerance >= 0.0:
-        raise UsageError(f"--tolerance {args.tolerance} is not a tolerance", where="push replay", do="Give 0 or more")
     if args.what_if:
         return what_if(path, args)
     result = replay(path, tolerance=args.tolerance)

@@ -23,15 +23,12 @@ from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
 from tools.run.run_state import status_line
 from tools.terminal import verdict
-from tools.terminal.arguments import name_or_path, named_path
+from tools.terminal.arguments import SEED, name_or_path, named_path, number
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
 from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
-
-MAX_SEED = 2**63 - 1
-"""The largest integer that the log can hold."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,11 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
     )
-    parser.add_argument("--distance-m", type=float, help="how far to push, from first contact")
+    parser.add_argument(
+        "--distance-m", type=number(0.001, 1000), metavar="M", help="how far to push, from first contact"
+    )
     parser.add_argument(
         "--controller", choices=("force", "open-loop"), help="force (the pushing law) or open-loop (straight ahead)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the simulated world (0)")
+    parser.add_argument("--seed", type=SEED, metavar="SEED", default=0, help="seed of the simulated world (0)")
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
     )
@@ -147,8 +146,6 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
         raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
-    if not 0 <= args.seed <= MAX_SEED:
-        raise UsageError(f"--seed {args.seed} is out of range", where="push run", do=f"Give 0 to {MAX_SEED}")
     check_room(rig, args.seed)
 
 

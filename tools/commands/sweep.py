@@ -17,7 +17,7 @@ from tools.study.engine import default_workers, engine, run_items
 from tools.study.grid import load_grid
 from tools.study.paper import paper_study
 from tools.study.plan import Plan, hardware_plan, lanes_plan
-from tools.terminal.arguments import name_or_path, named_path
+from tools.terminal.arguments import name_or_path, named_path, number, pair, whole_number
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,10 +29,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=named_path, metavar="DIR", help="folder for the results (default: sweeps/NAME-TIME)"
     )
     parser.add_argument("--resume", action="store_true", help="continue the study in --out, skipping finished parts")
-    parser.add_argument("--gains", metavar="K_F,K_Y", help="gains for all cases, for example --gains=0.1,0.3")
+    parser.add_argument(
+        "--gains",
+        type=pair(0, 10, "K_F,K_Y"),
+        metavar="K_F,K_Y",
+        help="gains for all cases, for example --gains=0.1,0.3",
+    )
     parser.add_argument("--open-loop", action="store_true", help="push straight along the path in all cases")
-    parser.add_argument("--dt", type=float, metavar="S", help="simulation step in s")
-    parser.add_argument("--workers", type=int, metavar="N", help="worker processes (default: one per core)")
+    parser.add_argument("--dt", type=number(1e-6, 100), metavar="S", help="simulation step in s")
+    parser.add_argument(
+        "--workers", type=whole_number(1, 10_000), metavar="N", help="worker processes (default: one per core)"
+    )
     parser.add_argument("--engine", choices=("joblib", "dask"), default="joblib", help="what runs the work")
     parser.add_argument("--scheduler", metavar="ADDR", help="Dask scheduler, for example tcp://127.0.0.1:8786")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
@@ -45,8 +52,6 @@ def run(args: argparse.Namespace) -> int:
     began = time.monotonic()
     plan = _plan(args)
     workers = default_workers() if args.workers is None else args.workers
-    if workers < 1:
-        raise UsageError(f"--workers {workers} is not possible", do="Give at least 1")
     if args.resume and not args.out:
         raise UsageError("--resume needs the folder of the study to continue", do="Add --out DIR")
     out = args.out or Path("sweeps") / f"{plan.name}-{time.strftime('%Y%m%d-%H%M%S')}"
@@ -83,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _plan(args: argparse.Namespace) -> Plan:
-    gains = _gains(args.gains) if args.gains else None
+    gains = args.gains
     if args.grid == "hardware":
         return hardware_plan(gains, args.dt, args.open_loop)
     changes: dict[str, Any] = {"k_f": gains[0], "k_y_rad_per_m": gains[1]} if gains else {}
@@ -106,19 +111,6 @@ def _terminate_as_interrupt() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def _gains(text: str) -> tuple[float, float]:
-    parts = text.split(",")
-    try:
-        k_f, k_y = (float(part) for part in parts)
-    except ValueError:
-        k_f = k_y = float("nan")
-    if not (0 <= k_f <= 10 and 0 <= k_y <= 10):
-        raise UsageError(
-            f"`{text}` is not a pair of gains between 0 and 10", where="--gains", do="For example --gains=0.1,0.3"
-        )
-    return k_f, k_y
 
 
 class Progress:

@@ -29,7 +29,7 @@ from sim_backend.physics.gain_limits import (
 )
 from sim_backend.physics.slider import Circle, Pressure, Rectangle
 from tools.study.tune_map import PRESETS
-from tools.terminal.arguments import named_path
+from tools.terminal.arguments import named_path, number, pair
 
 Choice = TypeVar("Choice", bound=str)
 SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
@@ -37,6 +37,8 @@ PRESSURES: tuple[Pressure, ...] = ("uniform", "rim", "point")
 MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
 SHARE = 0.5
 """The recommended k_y is this share of its limit: twice the gain is still stable."""
+LENGTHS_M = pair(0.01, 10, "LOW,HIGH", rising=True)
+"""The range of a slider's lengths."""
 CHECK_TOLERANCE = 0.01
 """Largest relative difference between the limits by simulation and by the closed form."""
 MAX_K_F_SHARE = 0.5
@@ -46,30 +48,36 @@ MAX_K_F_SHARE = 0.5
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("--shapes", default="box,circle", help="box, circle or both (default: box,circle)")
-    parser.add_argument("--size-m", default="0.3,0.7", metavar="LOW,HIGH", help="length along the push, or diameter")
-    parser.add_argument("--width-m", metavar="LOW,HIGH", help="width of a box across the push (default: its length)")
+    parser.add_argument(
+        "--size-m", type=LENGTHS_M, default="0.3,0.7", metavar="LOW,HIGH", help="length along the push, or diameter"
+    )
+    parser.add_argument(
+        "--width-m", type=LENGTHS_M, metavar="LOW,HIGH", help="width of a box across the push (default: its length)"
+    )
     parser.add_argument("--pressures", default="uniform,rim", help="any of uniform, rim, point (default: uniform,rim)")
     parser.add_argument(
         "--turning", choices=("ellipsoid", "along-push"), default="ellipsoid",
         help="what resists turning: the ellipsoid (default, cautious), or the pressure along the push",
     )  # fmt: skip
-    parser.add_argument("--ball-radius-m", type=float, default=0.05, metavar="M", help="radius of the contact ball")
     parser.add_argument(
-        "--push-height-m", type=float, default=0.15, metavar="M", help="height of the push above the floor"
+        "--ball-radius-m", type=number(0, 0.2), default=0.05, metavar="M", help="radius of the contact ball"
     )
-    parser.add_argument("--floor-friction", type=float, default=0.3, metavar="MU", help="friction of the floor")
+    parser.add_argument(
+        "--push-height-m", type=number(0, 2), default=0.15, metavar="M", help="height of the push above the floor"
+    )
+    parser.add_argument("--floor-friction", type=number(0, 2), default=0.3, metavar="MU", help="friction of the floor")
     parser.add_argument(
         "--anisotropy",
-        type=float,
+        type=number(0.5, 2),
         default=1.0,
         metavar="RATIO",
         help="floor friction along the path divided by that across it",
     )
     parser.add_argument(
-        "--slide-force-N", type=float, default=15.0, metavar="N", help="force that keeps a slider moving"
+        "--slide-force-N", type=number(0.1, 300), default=15.0, metavar="N", help="force that keeps a slider moving"
     )
     parser.add_argument(
-        "--k-f", type=float, default=0.3, metavar="K_F", help="k_f to recommend a k_y for (default: 0.3)"
+        "--k-f", type=number(1e-6, 2), default=0.3, metavar="K_F", help="k_f to recommend a k_y for (default: 0.3)"
     )
     parser.add_argument("--out", type=named_path, metavar="DIR", help="folder for the map (default: sweeps/tune-TIME)")
     parser.add_argument("--no-check", action="store_true", help="skip the simulations")
@@ -80,8 +88,6 @@ def run(args: argparse.Namespace) -> int:
     """Find gains and print them; return the exit code. Raises UsageError."""
     bodies = assumed_bodies(args)
     fast = fast_loop_k_f(bodies)
-    if not (math.isfinite(args.k_f) and args.k_f > 0):
-        raise UsageError("this is not a positive, finite number", where="--k-f")
     k_f = args.k_f if args.k_f <= MAX_K_F_SHARE * fast else _rounded_down(max(MAX_K_F_SHARE * fast, 1e-9))
     highest = limit(bodies, k_f)
     if highest <= 0:
@@ -92,7 +98,8 @@ def run(args: argparse.Namespace) -> int:
     k_y = _rounded_down(SHARE * highest)
     out = _folder(args.out)
     checks = [] if args.no_check else check_limits(bodies, k_f)
-    what = f"{args.shapes} of {args.size_m} m, pressure {args.pressures}, ball {args.ball_radius_m:g} m"
+    size = "{:g} to {:g} m".format(*args.size_m)
+    what = f"{args.shapes} of {size}, pressure {args.pressures}, ball {args.ball_radius_m:g} m"
     files = _draw(bodies, (k_f, k_y), what, out)
     result: dict[str, Any] = {
         "assumed": len(bodies),
@@ -127,16 +134,10 @@ def run(args: argparse.Namespace) -> int:
 
 def assumed_bodies(args: argparse.Namespace) -> list[PushedBody]:
     """Return the sliders the arguments assume: the ends of their ranges and some between. Raises UsageError."""
-    lengths = _range_samples(args.size_m, "--size-m")
-    widths = _range_samples(args.width_m, "--width-m") if args.width_m else None
+    lengths = samples(*args.size_m)
+    widths = samples(*args.width_m) if args.width_m else None
     shapes = _choices(args.shapes, SHAPES, "--shapes")
     pressures = _choices(args.pressures, PRESSURES, "--pressures")
-    for name in ("ball_radius_m", "push_height_m", "floor_friction"):
-        if not 0 <= getattr(args, name) < math.inf:
-            raise UsageError("this is not a number of at least 0", where=f"--{name.replace('_', '-')}")
-    for name in ("anisotropy", "slide_force_N"):
-        if not 0 < getattr(args, name) < math.inf:
-            raise UsageError("this is not a positive, finite number", where=f"--{name.replace('_', '-')}")
     effects = FloorEffects(
         shift_m=args.floor_friction * args.push_height_m, turning=args.turning, along_over_across=args.anisotropy
     )
@@ -234,19 +235,6 @@ def _folder(out: Path | None) -> Path:
             f"this folder cannot be written: {error.strerror}", where=str(folder), do="Give another --out"
         ) from None
     return folder
-
-
-def _range_samples(text: str, where: str) -> list[float]:
-    """Return samples of a range `low,high`, including both ends. Raises UsageError."""
-    try:
-        low, high = (float(part) for part in text.split(","))
-    except ValueError:
-        low = high = math.nan
-    if not 0 < low <= high < math.inf:
-        raise UsageError(
-            f"`{text}` is not a range of two positive lengths", where=where, do=f"For example {where}=0.3,0.7"
-        )
-    return samples(low, high)
 
 
 def _choices(text: str, known: tuple[Choice, ...], where: str) -> list[Choice]:

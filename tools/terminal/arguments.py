@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from argparse import ArgumentTypeError
+from collections.abc import Callable
 from pathlib import Path
 
 
@@ -23,3 +25,57 @@ def name_or_path(text: str) -> str:
 def named_path(text: str) -> Path:
     """Return a path with `~` replaced. Raises ArgumentTypeError for the home of nobody."""
     return Path(name_or_path(text))
+
+
+def number(low: float, high: float) -> Callable[[str], float]:
+    """Return the type of a number from `low` to `high`, both included."""
+
+    def read(text: str) -> float:
+        value = _float(text)
+        if not low <= value <= high:
+            raise ArgumentTypeError(f"`{text}` is not a number from {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def whole_number(low: int, high: int) -> Callable[[str], int]:
+    """Return the type of a whole number from `low` to `high`, both included."""
+
+    def read(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = low - 1
+        if not low <= value <= high:
+            raise ArgumentTypeError(f"`{text}` is not a whole number from {low} to {high}")
+        return value
+
+    return read
+
+
+def pair(low: float, high: float, names: str, *, rising: bool = False) -> Callable[[str], tuple[float, float]]:
+    """Return the type of two numbers from `low` to `high`, called `names` ("LOW,HIGH"); `rising`: in this order."""
+
+    def read(text: str) -> tuple[float, float]:
+        values = [_float(word) for word in text.split(",")]
+        if (
+            len(values) != 2
+            or not all(low <= value <= high for value in values)
+            or (rising and values != sorted(values))
+        ):
+            raise ArgumentTypeError(f"`{text}` is not {names} with both from {low:g} to {high:g}")
+        return values[0], values[1]
+
+    return read
+
+
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+SEED = whole_number(0, 2**63 - 1)
+"""The largest is the largest integer that the log can hold."""
