@@ -78,6 +78,15 @@ def test_open_identifies_the_device(level, driver):
     assert driver.health().state in (LinkState.UP, LinkState.OPENING)
 
 
+def test_an_open_driver_says_that_nothing_flows_before_its_start(level, driver):
+    driver.open()
+    level.let_pass(SLOW_S)
+    assert driver.drain() == ()
+    assert "start" in driver.health().cause
+    driver.start()
+    assert driver.health().cause == ""
+
+
 def test_samples_flow_after_start_oldest_first(level, driver):
     driver.open()
     driver.start()

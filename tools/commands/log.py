@@ -8,7 +8,8 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -112,8 +113,11 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
     try:
         if out.exists() and any(out.iterdir()):
             raise UsageError("the directory is not empty", where=str(out), do="Give another one with --out")
+        made = not out.exists()
         out.mkdir(parents=True, exist_ok=True)
-        files = _write_tables(decoders, args.log, out, summary.start_ns)
+        files: dict[str, int] = {}
+        with _removed_on_failure(out, files, made=made):
+            _write_tables(decoders, args.log, out, summary.start_ns, files)
     except OSError as error:
         raise EnvironmentFault(f"the tables cannot be written: {error.strerror}", where=str(out)) from None
     for name, rows in files.items():
@@ -121,8 +125,22 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
     return {"out": str(out), "files": files, "unreadable": _report_unreadable(decoders, args, sum(files.values()))}
 
 
-def _write_tables(decoders: Decoders, log: Path, out: Path, start_ns: int) -> dict[str, int]:
-    rows: dict[str, int] = {}
+@contextmanager
+def _removed_on_failure(out: Path, files: dict[str, int], *, made: bool) -> Iterator[None]:
+    """Remove the files from `out`, and the folder if it was made for them: half an export would block the next."""
+    try:
+        yield
+    except BaseException:
+        for name in files:
+            (out / name).unlink(missing_ok=True)
+        if made:
+            with suppress(OSError):  # something else is in it
+                out.rmdir()
+        raise
+
+
+def _write_tables(decoders: Decoders, log: Path, out: Path, start_ns: int, rows: dict[str, int]) -> None:
+    """Write the tables; `rows` counts what is in each file."""
     names: dict[tuple[str, str], str] = {}
     writers: dict[tuple[str, str], Any] = {}
     with ExitStack() as stack:
@@ -137,13 +155,12 @@ def _write_tables(decoders: Decoders, log: Path, out: Path, start_ns: int) -> di
                 if names[table] in rows:
                     raise UsageError(f"two topics would share {names[table]}", do="Name one of them with --topics")
                 file = stack.enter_context((out / names[table]).open("x", newline="", encoding="utf-8"))
+                rows[names[table]] = 0
                 writers[table] = csv.writer(file)
                 writers[table].writerow(["log_time [ns]", "time [s]", *(column for column, _ in cells)])
-                rows[names[table]] = 0
             time_s = (log_time_ns - start_ns) / NS_PER_S
             writers[table].writerow([log_time_ns, time_s, *(cell for _, cell in cells)])
             rows[names[table]] += 1
-    return rows
 
 
 def _recover(args: argparse.Namespace) -> dict[str, Any]:

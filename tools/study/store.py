@@ -35,13 +35,15 @@ class Store:
     """A study's folder. Raises UsageError if it cannot be used.
 
     out: the folder, created if missing. mark: the study's fingerprint. resume: whether to continue an
-    existing study (an empty folder is accepted, so that a restartable job can always set it).
+    existing study (a folder without a finished part is accepted, so that a restartable job can always set it).
     """
 
     def __init__(self, out: Path, name: str, mark: str, *, resume: bool) -> None:
         self.out = out
         self._mark = mark
         found = _found(out)
+        if found is not None and not any((out / "parts").glob("*.npz")):
+            found = None  # nothing came of it
         if found is not None and found != mark:
             raise UsageError(
                 "this folder contains another study (or one by another version of the program)",

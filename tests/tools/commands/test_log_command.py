@@ -117,6 +117,25 @@ def test_export_writes_a_table_per_topic_with_units(log, tmp_path, capsys):
     assert sorted((tmp_path / "run_csv").iterdir()) == before
 
 
+def test_a_format_is_not_read_as_a_topic(log, tmp_path, capsys):
+    assert main(["log", "export", str(log), "--to", "parquet"]) == 2
+    assert "unrecognized arguments: --to parquet" in capsys.readouterr().err
+    assert not (tmp_path / "run_csv").exists()
+
+
+def test_an_export_that_failed_does_not_block_the_next(tmp_path, capsys):
+    payload = b"\x00\x01\x00\x00\x01"
+    path = odd(tmp_path / "odd.mcap", {"/a/b": ("bool x", payload), "/a_b": ("bool x", payload)})
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    for out in (tmp_path / "new", kept):
+        assert main(["log", "export", str(path), "--out", str(out)]) == 2
+        assert "two topics would share a_b.csv" in capsys.readouterr().err
+        assert out.exists() == (out == kept)
+        assert main(["log", "export", str(path), "--out", str(out), "--topics", "/a_b"]) == 0
+        assert [file.name for file in out.iterdir()] == ["a_b.csv"]
+
+
 def test_export_into_a_place_that_cannot_be_written_is_one_sentence(log, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main(["log", "export", str(log), "--out", str(tmp_path / "file" / "x")]) == 3

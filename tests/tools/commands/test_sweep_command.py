@@ -16,6 +16,7 @@ import pytest
 from robot_io.errors import EnvironmentFault, PushError
 from tools import cli
 from tools.study import items as sweep_items
+from tools.study import plan
 from tools.study.engine import run_items
 from tools.study.grid import load_grid
 from tools.study.items import COLUMNS, Part
@@ -363,6 +364,19 @@ def test_foreign_finished_and_unwritable_folders_are_refused_untouched(tmp_path,
 
     assert push(capsys, grid, "--out", grid / "below-a-file")[0] == 2
     assert push(capsys, grid, "--out", "/proc/nowhere")[0] == 2
+
+
+def test_a_study_that_could_not_begin_does_not_block_the_next(tmp_path, grid, capsys, monkeypatch):
+    def without_numba():
+        raise EnvironmentFault("numba is not installed")
+
+    out = tmp_path / "out"
+    with monkeypatch.context() as patched:
+        patched.setattr(plan, "compile_kernel", without_numba)
+        assert push(capsys, grid, "--out", out)[0] == 3
+        assert push(capsys, grid, "--out", out, "--gains=0.1,0.2")[0] == 3
+    assert push(capsys, grid, "--out", out, "--workers", 1)[0] == 0
+    assert len(rows_of(out)) == 9
 
 
 def workers_of(pid):
