@@ -32,6 +32,7 @@ LONG_GAP_NS = 35 * NS_PER_MS
 MAX_READS_PER_DRAIN = 4
 MAX_SAMPLES_PER_DRAIN = 512
 RATE_SAMPLES = 101
+NOT_STREAMING = "it does not stream: call start()"
 
 
 class Ft300Reading(msgspec.Struct, frozen=True, gc=False):
@@ -145,7 +146,7 @@ class Ft300(DriverBase):
 
         Counters since the driver was made: `packets_ok`, `crc_fail`, `junk_bytes`, `resyncs`, `bursts` (several
         packets in one read), `empty_reads`, `overflow` (samples dropped), `long_gaps` (over 35 ms), `max_gap_us`,
-        `beyond_range`.
+        `beyond_range`. An open sensor that does not stream is UP, and its cause says that `start` is missing.
         """
         parser = self._parser
         counters = {
@@ -155,7 +156,10 @@ class Ft300(DriverBase):
             "resyncs": parser.resyncs,
             **self._counted,
         }
-        return DeviceHealth(self._state, self._cause, counters, self._rate_hz())
+        cause = self._cause
+        if self._state is LinkState.UP and not self._streaming:
+            cause = cause or NOT_STREAMING
+        return DeviceHealth(self._state, cause, counters, self._rate_hz())
 
     def probe(self) -> Ft300Reading:
         """Read identity, wrench and acceleration by polled registers; nothing is started.

@@ -168,6 +168,8 @@ class Ur10(DriverBase):
             state, cause = LinkState.LOST, f"the arm's process {self._child.how_it_ended()}"
         if state == LinkState.LOST or record.error != ArmError.NONE:
             cause = ArmError(record.error).name.lower() if record.error else cause
+        if state == LinkState.UP and not self._flowing:
+            cause = cause or "it gives no samples yet: call start()"
         return DeviceHealth(state, cause, {"packets": record.packets}, self._rate_hz(record))
 
     def stop(self) -> None:

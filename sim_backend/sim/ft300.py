@@ -91,7 +91,9 @@ class SimFt300(DriverBase):
 
     def health(self) -> DeviceHealth:
         """Return link state, counters and the nominal rate."""
-        cause = "" if self._state is LinkState.UP else "closed"
+        cause = "" if self._streaming else "it does not stream: call start()"
+        if self._state is not LinkState.UP:
+            cause = "closed"
         counters = {"packets_ok": self._packets_ok, "overflow": self._overflow}
         return DeviceHealth(self._state, cause, counters, self._rate_hz if self._streaming else 0.0)
 

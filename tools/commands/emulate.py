@@ -16,7 +16,7 @@ from types import FrameType
 
 from robot_io.clock import monotonic_ns
 from robot_io.error_report import say_json
-from robot_io.errors import UsageError
+from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import set_timer_slack_1ns
 from sim_backend.ft300.emulator import Ft300Emulator
@@ -130,13 +130,15 @@ def _open_ft300(loop: EventLoop, args: argparse.Namespace, opened: contextlib.Ex
 
 
 def _open_ur10(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
-    emulator = UrEmulator(loop, StillArm(), host=args.host)
+    with _elsewhere("--host 127.x.y.z"):
+        emulator = UrEmulator(loop, StillArm(), host=args.host)
     opened.callback(emulator.close)
     return [emulator]
 
 
 def _open_ridgeback(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
-    emulator = standalone_emulator(loop, host=args.host, port=args.port)
+    with _elsewhere("--host 127.x.y.z or --port"):
+        emulator = standalone_emulator(loop, host=args.host, port=args.port)
     opened.callback(emulator.close)
     return [emulator]
 
@@ -145,14 +147,29 @@ def _open_all(loop: EventLoop, args: argparse.Namespace, opened: contextlib.Exit
     rig = resolve_rig(args.rig, args.set)
     world = World(rig, args.seed, monotonic_ns())
     emulators: list[Emulator] = []
-    for open_device in (
-        lambda: open_ft300(loop, world, rig),
-        lambda: open_ur10(loop, world, rig, (args.arm_host,)),
-        lambda: open_ridgeback(loop, world, rig, args.base_host, args.base_port),
+    for open_device, options in (
+        (lambda: open_ft300(loop, world, rig), ""),
+        (lambda: open_ur10(loop, world, rig, (args.arm_host,)), "--arm-host 127.x.y.z"),
+        (
+            lambda: open_ridgeback(loop, world, rig, args.base_host, args.base_port),
+            "--base-host 127.x.y.z or --base-port",
+        ),
     ):
-        emulators.append(open_device())
+        with _elsewhere(options):
+            emulators.append(open_device())
         opened.callback(emulators[-1].close)
     return emulators
+
+
+@contextlib.contextmanager
+def _elsewhere(options: str) -> Iterator[None]:
+    """Name, where an emulator cannot listen, the options that give it another address."""
+    try:
+        yield
+    except EnvironmentFault as error:
+        if options:
+            error.do = f"End what runs there, or give another address: {options}"
+        raise
 
 
 def _loopback(text: str) -> str:

@@ -48,7 +48,8 @@ def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, .
         try:
             return UrEmulator(loop, world, host=host, rate_hz=rig.world.arm_rate_hz, phase=rig.world.arm_phase)
         except EnvironmentFault:
-            continue
+            if len(hosts) == 1:
+                raise
     raise EnvironmentFault(
         "no loopback address is free for an emulated UR10",
         where=f"{hosts[0]} to {hosts[-1]}",

@@ -121,6 +121,27 @@ def test_all_share_one_world():
         assert child.wait(timeout=10) == 0
 
 
+@pytest.mark.parametrize(
+    ("argv", "port", "options"),
+    [
+        (["ur10", "--host", "127.0.42.9"], 30004, ["--host 127.x.y.z"]),
+        (["all", "--arm-host", "127.0.42.9"], 30004, ["--arm-host 127.x.y.z"]),
+        (["ridgeback", "--host", "127.0.42.9", "--port", "9090"], 9090, ["--host 127.x.y.z", "--port"]),
+        (
+            ["all", "--arm-host", "127.0.42.10", "--base-host", "127.0.42.9", "--base-port", "9090"],
+            9090,
+            ["--base-host 127.x.y.z", "--base-port"],
+        ),
+    ],
+)
+def test_a_taken_address_names_the_option_for_another(argv, port, options, capsys):
+    with socket.create_server(("127.0.42.9", port)):
+        assert cli.main(["emulate", *argv, "--json"]) == 3
+    error = json.loads(capsys.readouterr().out.splitlines()[-1])["error"]
+    assert error["where"] == f"127.0.42.9:{port}"
+    assert all(option in error["do"] for option in options)
+
+
 def test_a_taken_address_is_one_sentence():
     with emulate("ur10", "--host", "127.0.42.3"):
         second = subprocess.run(
