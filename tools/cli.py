@@ -82,7 +82,7 @@ COMMANDS = {
     ),
     "config": Command(
         "tools.commands.config",
-        "show or check a rig with all its values",
+        "show or check a rig with all its values, or a schema for editors",
         ("push config show emulated --set control.k_f=0.1", "push config check my-rig.toml"),
     ),
     "bench sim": Command(

@@ -15,7 +15,7 @@ from typing import Any, ForwardRef
 
 import msgspec
 
-from tools.dev.notes import notes_of
+from robot_io.rig.notes import notes_of
 
 WIDEST = 96
 """A longer signature gets one line per parameter."""

@@ -15,8 +15,8 @@ from msgspec import Meta
 
 from robot_io.rig import config, task, topics, world
 from robot_io.rig.config import RigConfig
+from robot_io.rig.notes import notes_of
 from robot_io.rig.renames import RENAMED, RETIRED, advice
-from tools.dev.notes import notes_of
 
 INTRO = """# Rig files
 
@@ -32,6 +32,12 @@ A rig file is TOML and describes one robot, real or not. `push run NAME` uses a 
 `push config show RIG` prints every value, `push config check RIG` reports every mistake at once, and
 `--set control.k_f=0.1` changes one value for one run. The unit is in the key; ranges are checked; for an unknown
 key the nearest known one is suggested. The program's own ceilings (`safety/limits.py`) may only be lowered.
+
+Editors complete keys, show their ranges and mark mistakes (VS Code with *Even Better TOML*, others with Taplo) after
+
+    push config schema > rig.schema.json
+
+and with `#:schema ./rig.schema.json` as the first line of the rig.
 
 `level` is set for each device: `sim` (all three or none), `emulated` (the real driver on a wire emulator) or
 `hardware`; the last two can be mixed. `ft.port` is a device path, a pty or `socket://host:port`.
