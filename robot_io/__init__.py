@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robot_io import errors, messages
 from robot_io._lazy import exports
 
 if TYPE_CHECKING:
+    from robot_io import errors, messages
     from robot_io.ft300.driver import Ft300
     from robot_io.kinds import open_device
     from robot_io.ridgeback.driver import Ridgeback
@@ -28,6 +28,8 @@ __getattr__ = exports(
         "Ft300": "ft300.driver",
         "Ridgeback": "ridgeback.driver",
         "Ur10": "ur10.driver",
+        "errors": "",
+        "messages": "",
         "open_device": "kinds",
     },
 )

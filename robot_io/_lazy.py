@@ -8,11 +8,16 @@ from typing import Any
 
 
 def exports(package: str, modules: dict[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` (PEP 562) of `package`; `modules` says which of its modules defines each name."""
+    """Return the `__getattr__` (PEP 562) of `package`; `modules` says which of its modules defines each name.
+
+    An empty one: the name is that of a module.
+    """
 
     def find(name: str) -> Any:
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        if not modules[name]:
+            return importlib.import_module(f"{package}.{name}")
         return getattr(importlib.import_module(f"{package}.{modules[name]}"), name)
 
     return find

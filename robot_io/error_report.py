@@ -6,8 +6,6 @@ import contextlib
 import json
 import os
 import sys
-import tempfile
-import traceback
 from collections.abc import Iterator
 
 from robot_io.errors import PushError
@@ -62,6 +60,9 @@ def report(error: PushError, *, as_json: bool) -> int:
 
 def unexpected(error: BaseException) -> PushError:
     """Turn a defect of the program into a sentence that says where its traceback was written."""
+    import tempfile  # here, because few programs of ours ever need them
+    import traceback
+
     trace = "".join(traceback.format_exception(error))
     try:
         with tempfile.NamedTemporaryFile(

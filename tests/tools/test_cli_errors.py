@@ -151,6 +151,13 @@ def test_the_examples_are_commands_that_parse(name):
         parser.parse_args(words[1 + len(name.split()) :])
 
 
+def test_the_overview_loads_nothing_that_takes_long():
+    code = "import sys; from robot_io._entry import main; main(); print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code, "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(done.stderr.split())
+    assert not loaded & {"msgspec", "numpy", "serial", "mcap", "inspect", "tempfile", "traceback", "asyncio"}
+
+
 def test_overview_lists_the_commands(capsys):
     assert cli.main([]) == 0
     shown = capsys.readouterr().out
