@@ -124,6 +124,13 @@ def test_the_mean_is_over_half_a_second_or_over_what_there_is():
     assert contact_threshold.felt(state, (0.6, 0.8)) == pytest.approx(0.6 * 40 + 0.8 * 41)
 
 
+def test_the_mean_of_a_tenth_of_a_second_is_of_all_three_parts():
+    state = ContactState()
+    for force, ms in (((1.0, 2.0, 3.0), 0), ((4.0, 8.0, 16.0), 50), ((0.0, 0.0, 0.0), 100)):
+        state = contact_threshold.add(state, force, ms * MS)
+    assert contact_threshold.mean_force(state) == (2.5, 5.0, 9.5)
+
+
 def test_the_force_before_a_contact_is_that_before_its_own_half_second():
     """3, 4, 0 N, half a second each: 3 N before a contact found by the mean of the 4 N, 3.2 N just before the last."""
     state = window(*[3.0] * 5, *[4.0] * 5)
@@ -174,6 +181,7 @@ def test_the_contact_is_lost_below_half_the_median_between_two_newton_and_force_
     assert learned(5.3, 5.3, 5.3) == pytest.approx(2.65)
     assert learned(3.0, 3.0, 3.0) == 2.0
     assert learned(8.0, 6.0, 99.0) == 4.0
+    assert learned(9.0, 99.0, 8.0, 6.0, 4.2) == 4.0
     assert learned(15.0, 15.0) == 2.0, "nothing is known yet"
     assert learned(force_min=1.0) == 1.0
 
@@ -240,6 +248,7 @@ def test_a_base_that_is_held_while_the_contact_is_lost_loses_nothing():
     [
         (0.0, 0.3, False),
         (0.0, 0.31, True),
+        (0.4, 0.8, False),
         (0.39, 0.7, False),
         (0.34, 0.7, True),
         (0.36, 0.7, False),
