@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from control import contact_threshold
 from control.wrench import median_of_three
-from robot_io.messages import Pose2D
+from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ContactState, ControlState, Phase, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing, with_force
 from tests.safety.fold_bench import without_contact as no_force
@@ -225,6 +225,25 @@ def test_loss_is_counted_in_times_way_and_time():
     assert (bench.state.control.lost_m, bench.state.control.lost_ns) == (before.lost_m, before.lost_ns)
     bench.run_until(lambda b: b.state.control.phase == Phase.LOST, no_force)
     assert bench.state.control.lost_count == 2
+
+
+def test_skipped_ticks_count_as_loss_and_a_speed_that_is_no_number_as_no_way():
+    bench = pushing()
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST, no_force)
+    bench.fold(no_force)
+
+    def altered(twist):
+        return lambda inp, _: replace(
+            no_force(inp), host=replace(inp.host, skipped=2), base=replace(inp.base, odometry=twist)
+        )
+
+    before = bench.state.control
+    bench.fold(altered(BodyTwist(0.06, 0.08, 0.0)))
+    assert bench.state.control.lost_ns - before.lost_ns == 30 * MS
+    assert bench.state.control.lost_m - before.lost_m == pytest.approx(0.003)
+    before = bench.state.control
+    bench.fold(altered(BodyTwist(NAN, 0.1, 0.0)))
+    assert bench.state.control.lost_m == before.lost_m
 
 
 def test_a_base_that_is_held_while_the_contact_is_lost_loses_nothing():
