@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from control import contact_threshold
 from control.wrench import median_of_three
-from robot_io.messages import Pose2D
+from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ContactState, ControlState, Phase, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing, with_force
 from tests.safety.fold_bench import without_contact as no_force
@@ -124,6 +124,13 @@ def test_the_mean_is_over_half_a_second_or_over_what_there_is():
     assert contact_threshold.felt(state, (0.6, 0.8)) == pytest.approx(0.6 * 40 + 0.8 * 41)
 
 
+def test_the_mean_of_a_tenth_of_a_second_is_of_all_three_parts():
+    state = ContactState()
+    for force, ms in (((1.0, 2.0, 3.0), 0), ((4.0, 8.0, 16.0), 50), ((0.0, 0.0, 0.0), 100)):
+        state = contact_threshold.add(state, force, ms * MS)
+    assert contact_threshold.mean_force(state) == (2.5, 5.0, 9.5)
+
+
 def test_the_force_before_a_contact_is_that_before_its_own_half_second():
     """3, 4, 0 N, half a second each: 3 N before a contact found by the mean of the 4 N, 3.2 N just before the last."""
     state = window(*[3.0] * 5, *[4.0] * 5)
@@ -174,6 +181,7 @@ def test_the_contact_is_lost_below_half_the_median_between_two_newton_and_force_
     assert learned(5.3, 5.3, 5.3) == pytest.approx(2.65)
     assert learned(3.0, 3.0, 3.0) == 2.0
     assert learned(8.0, 6.0, 99.0) == 4.0
+    assert learned(9.0, 99.0, 8.0, 6.0, 4.2) == 4.0
     assert learned(15.0, 15.0) == 2.0, "nothing is known yet"
     assert learned(force_min=1.0) == 1.0
 
@@ -219,6 +227,25 @@ def test_loss_is_counted_in_times_way_and_time():
     assert bench.state.control.lost_count == 2
 
 
+def test_skipped_ticks_count_as_loss_and_a_speed_that_is_no_number_as_no_way():
+    bench = pushing()
+    bench.run_until(lambda b: b.state.control.phase == Phase.LOST, no_force)
+    bench.fold(no_force)
+
+    def altered(twist):
+        return lambda inp, _: replace(
+            no_force(inp), host=replace(inp.host, skipped=2), base=replace(inp.base, odometry=twist)
+        )
+
+    before = bench.state.control
+    bench.fold(altered(BodyTwist(0.06, 0.08, 0.0)))
+    assert bench.state.control.lost_ns - before.lost_ns == 30 * MS
+    assert bench.state.control.lost_m - before.lost_m == pytest.approx(0.003)
+    before = bench.state.control
+    bench.fold(altered(BodyTwist(NAN, 0.1, 0.0)))
+    assert bench.state.control.lost_m == before.lost_m
+
+
 def test_a_base_that_is_held_while_the_contact_is_lost_loses_nothing():
     bench = pushing()
     bench.run_until(lambda b: b.state.control.phase == Phase.LOST, no_force)
@@ -240,6 +267,7 @@ def test_a_base_that_is_held_while_the_contact_is_lost_loses_nothing():
     [
         (0.0, 0.3, False),
         (0.0, 0.31, True),
+        (0.4, 0.8, False),
         (0.39, 0.7, False),
         (0.34, 0.7, True),
         (0.36, 0.7, False),

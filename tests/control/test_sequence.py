@@ -7,6 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from control.sensing import sense
+from control.sequence import advance, all_devices_sent_data
+from control.settings import Settings
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ControlState, Mode, Operator, Phase, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing
@@ -73,6 +75,18 @@ def test_nothing_begins_before_every_device_has_spoken(name):
     assert bench.state.control.phase == Phase.TARE
     assert bench.output.mode == Mode.READY
     assert bench.state.control.held_joints == bench.rig.arm.held_pose_rad
+
+
+def test_what_is_a_tenth_of_a_second_old_is_fresh_enough_to_begin():
+    bench = FoldBench()
+    for n in range(60):
+        bench.fold(lambda inp, _: replace(inp, base=replace(inp.base, pose_seq=0)), n)
+    settings, state, inp = Settings.of(bench.rig), bench.state.control, bench.inp
+    at_ns = inp.now_ns - 100_000_000
+    base = replace(inp.base, pose_seq=20, pose_received_ns=at_ns, odometry_received_ns=at_ns)
+    old = replace(inp, base=base, arm=replace(inp.arm, published_ns=at_ns))
+    assert all_devices_sent_data(settings, replace(state, last_reading_ns=at_ns), old)
+    assert not all_devices_sent_data(settings, replace(state, last_reading_ns=at_ns - 1), old)
 
 
 def test_nothing_moves_before_the_approach():
@@ -621,6 +635,21 @@ def test_a_sensor_that_does_not_read_zero_afterwards_is_told():
     assert bench.state.control.residual_N == pytest.approx(5.5, abs=0.2)
     assert bench.output.faults == ("F09",)
     assert bench.output.exit_code == 0
+
+
+def test_a_finished_push_wants_no_speed():
+    bench = pushing()
+    bench.fold()
+    done = replace(bench.state.control, phase=int(Phase.DONE), speed=0.1)
+    assert advance(Settings.of(bench.rig), done, bench.inp, (0.0, 0.0), False).speed == 0.0
+
+
+def test_a_place_that_is_no_number_is_no_progress():
+    bench = pushing()
+    bench.fold()
+    begun = replace(bench.state.control, contact_from_m=-1.7e308, progress_m=0.25, lateral_m=0.5)
+    after = advance(Settings.of(bench.rig), begun, bench.inp, (1.7e308, 0.0), True)
+    assert (after.progress_m, after.lateral_m) == (0.25, 0.5)
 
 
 def test_a_finished_push_stays_finished():
