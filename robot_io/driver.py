@@ -2,7 +2,8 @@
 
 `open` identifies the device, or raises a `DeviceError` within a named time. `start` begins the flow. `drain`
 returns all new samples since the last call, oldest first, bounded, and never blocks and never raises on
-link loss (it gives what came before, then nothing, and `health` says LOST). `stop` and `close` are idempotent,
+link loss (it gives what came before, then nothing, and `health` says LOST). While a driver is UP and gives nothing
+because `start` was not called, the cause of its `health` says so. `stop` and `close` are idempotent,
 bounded and never raise. A driver stamps arrivals; it never judges staleness and never resumes motion by itself.
 It starts no threads and takes no locks: use it from one thread, the one that opened it.
 
