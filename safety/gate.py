@@ -117,8 +117,10 @@ def on_frame(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, 
     """Judge one frame (None: unreadable) read at `now_ns`; a bad one latches."""
     if state.latch:
         return state
+    if frame is None:
+        return latched(state, Latch.NONSENSE)
     latch = _judge(limits, state, frame, now_ns)
-    if latch or frame is None:
+    if latch:
         return latched(state, latch)
     return msgspec.structs.replace(
         state, seq=frame.seq, tick=frame.tick, frame_ns=now_ns, twist=frame.twist, said_ns=frame.sent_ns
@@ -142,7 +144,7 @@ def on_own_pause(state: GateState, pause_ns: int) -> GateState:
 
 def on_clock(state: GateState, now_ns: int) -> GateState:
     """Latch when control has been silent too long (never before its first frame)."""
-    if not state.latch and state.frame_ns and now_ns - state.frame_ns > FRAME_MAX_AGE_NS:
+    if state.frame_ns and now_ns - state.frame_ns > FRAME_MAX_AGE_NS:
         return latched(state, Latch.SILENCE)
     return state
 
@@ -151,7 +153,7 @@ def on_speed(limits: EnvelopeLimits, state: GateState, twist: BodyTwist) -> Gate
     """Count measured speeds (odometry, BODY frame) beyond the envelope or no numbers; three in a row latch."""
     count = state.overspeed + 1 if too_fast(limits, twist) else 0
     state = msgspec.structs.replace(state, overspeed=count)
-    if count < OVERSPEED_SAMPLES or state.latch:
+    if count < OVERSPEED_SAMPLES:
         return state
     return latched(state, Latch.OVERSPEED if is_number(twist) else Latch.ODOMETRY)
 
@@ -188,9 +190,7 @@ def sent(state: GateState, twist: BodyTwist, now_ns: int) -> GateState:
     return msgspec.structs.replace(state, sent=twist, sent_ns=now_ns)
 
 
-def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame | None, now_ns: int) -> Latch:
-    if frame is None:
-        return Latch.NONSENSE
+def _judge(limits: EnvelopeLimits, state: GateState, frame: GateFrame, now_ns: int) -> Latch:
     if frame.seq != state.seq + 1:
         return Latch.SEQUENCE
     if frame.tick <= state.tick:

@@ -132,7 +132,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
 
     def on_asleep(self, asleep_ns: int | None) -> GateShell:
         """Latch when this machine was suspended since the last look (None: not readable just now, so look again)."""
-        if asleep_ns is None or asleep_ns == self.asleep_ns:
+        if asleep_ns is None:
             return self
         known = self.asleep_ns is not None and abs(asleep_ns - self.asleep_ns) > JUMP_NS
         state = gate.latched(self.gate, Latch.SUSPENDED) if known else self.gate

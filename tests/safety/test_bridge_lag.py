@@ -55,6 +55,42 @@ def test_a_steady_bridge_does_not_lag_however_far_the_clocks_are_apart():
     assert heard(lambda _: -9e6, 60_000).growth_ns < MS
 
 
+def after(*messages):
+    """Return the lag after messages, each (received ms, age on its way ms); the run's first came at 1000 ms."""
+    lag = NEW
+    for received_ms, age_ms in messages:
+        lag = lag.on_stamp(received_ms * MS, (received_ms - age_ms) * 1e-3)
+    return lag
+
+
+THREE = ((1000, 30), (1020, 30), (1040, 30))
+
+
+def test_in_the_first_second_nothing_is_growth_and_from_then_on_it_is():
+    late = [(ms, 80) for ms in (1960, 1980, 2000)]
+    assert after(*THREE, *late).growth_ns == 0
+    assert after(*THREE, *late, (2001, 80)).growth_ns == pytest.approx(50 * MS, abs=0.02 * MS)
+
+
+def test_the_baseline_grows_by_half_a_millisecond_a_second():
+    late = after(*THREE, *[(ms, 80) for ms in (2000, 2020, 2040)])
+    then = late.on_stamp(12_040 * MS, (12_040 - 80) * 1e-3)
+    assert late.growth_ns - then.growth_ns == pytest.approx(5 * MS, abs=0.001 * MS)
+    back = then.on_stamp(12_000 * MS, (12_000 - 80) * 1e-3)  # received earlier: no time has passed
+    assert back.growth_ns == pytest.approx(then.growth_ns, abs=1000)
+
+
+def test_the_youngest_of_three_messages_counts():
+    assert after(*THREE, *[(3000 + n, 30) for n in range(3)], (3100, 500), (3101, 500)).growth_ns < MS
+    three_late = after(*THREE, *[(3000 + n, 30) for n in range(3)], *[(3100 + n, 500) for n in range(3)])
+    assert three_late.growth_ns == pytest.approx(470 * MS, abs=2 * MS)
+
+
+def test_a_robot_whose_clock_began_at_zero_is_heard_from_its_first_second():
+    assert NEW.on_stamp(5 * MS, 0.5).first_ns == 5 * MS
+    assert Lag() == Lag(first_ns=0, newest_ns=0, recent=(), baseline=0, growth_ns=0)
+
+
 @pytest.mark.parametrize("stamp_s", [0.0, -1.0, math.nan, math.inf, 2.0**32, 1e19, 1.7e308])
 def test_a_stamp_that_no_clock_of_ros_can_give_is_left_out(stamp_s):
     """Its seconds have 32 bits; beyond 64 bits of nanoseconds the record could not be published."""

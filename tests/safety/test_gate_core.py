@@ -411,3 +411,9 @@ def test_a_gate_that_was_frozen_itself_latches():
     frozen = on_own_pause(state, 100 * MS + 1)
     assert frozen.latch == Latch.PAUSED
     assert frozen.twist == BodyTwist()
+
+
+def test_a_gate_begins_with_nothing_heard_and_nothing_sent():
+    assert GateState() == GateState(
+        latch=Latch.NONE, seq=0, tick=-1, frame_ns=0, twist=ZERO, sent=ZERO, sent_ns=0, overspeed=0, said_ns=0
+    )

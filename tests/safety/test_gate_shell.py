@@ -267,6 +267,8 @@ def test_over_a_lost_link_they_are_in_vain():
         (BodyTwist(0.005, 0.0, 0.0), 131, False),
         (BodyTwist(0.0, -0.005, 0.0), 131, False),
         (BodyTwist(0.0, 0.0, 0.005), 131, False),
+        (BodyTwist(-0.005, 0.0, 0.0), 131, False),
+        (BodyTwist(0.0, 0.0, -0.005), 131, False),
         (BodyTwist(float("nan"), 0.0, 0.0), 131, False),
     ],
 )

@@ -12,7 +12,7 @@ from safety import gate
 from safety.envelope import EnvelopeLimits
 from safety.gate import GateState, Latch
 from safety.gate_shell import GateShell
-from safety.motion_bounds import TravelLimits, total_bounds
+from safety.motion_bounds import TravelLimits, phase_bounds, total_bounds
 from safety.travel import Travel
 from tools.rig import resolve_rig
 
@@ -29,6 +29,29 @@ def test_what_the_shipped_rig_can_need():
     assert bounds.distance_m == pytest.approx(1.1 * (0.55 + 2.5 + 0.3 + 3 * 0.55 + 0.05))
     # approach 11 + 1, push 25 + 2, lost 3 + 1, resumes 3 x 12, retreat 1 + 1 s; twice for SLOW, a tenth for slip
     assert bounds.moving_s == pytest.approx(1.1 * 2 * (12 + 27 + 4 + 3 * 12 + 2))
+
+
+@pytest.mark.parametrize(
+    ("settings", "lost_m", "ramp_s"),
+    [
+        (("control.ramp_s=1.5",), 0.3, 1.5),
+        (("control.ramp_s=1.5", "control.lost_time_s=4"), 0.4, 1.5),  # 4 s at 0.1 m/s
+        (("control.ramp_s=1.5", "control.lost_distance_m=0.5"), 0.5, 1.5),
+        (("limits.max_acceleration_m_per_s2=0.05",), 0.3, 2.0),  # 0.1 m/s at 0.05 m/s^2
+    ],
+)
+def test_what_each_phase_can_need(settings, lost_m, ramp_s):
+    """5 cm more each; twice the time for SLOW; one loss of contact within the push."""
+    found = phase_bounds(resolve_rig("sim", settings))
+    lost_time_s = 4 if "control.lost_time_s=4" in settings else 3
+    approach_m, retreat_m = 1.1 * 0.55 + 0.05, 1.1 * 0.05 + 0.05
+    push_m = 1.1 * 1.25 * 2 + 1.1 * lost_m + 0.05
+    lost_s = 2 * (lost_time_s + ramp_s)
+    assert (found.approach_m, found.push_m, found.retreat_m) == pytest.approx((approach_m, push_m, retreat_m))
+    assert (found.lost_m, found.lost_s) == pytest.approx((1.1 * lost_m, lost_s))
+    assert found.approach_s == pytest.approx(2 * (approach_m / 0.05 + ramp_s))
+    assert found.push_s == pytest.approx(2 * (push_m / 0.1 + 2 * ramp_s) + lost_s)
+    assert found.retreat_s == pytest.approx(2 * (retreat_m / 0.05 + ramp_s))
 
 
 @pytest.mark.parametrize(
