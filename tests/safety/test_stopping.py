@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from safety.faults import FAULTS
 from safety.stopping import alone_m, distance_m, of_row, stopping
@@ -58,3 +59,21 @@ def test_of_a_rig():
     assert (found.slowest_row, found.slowest_m) == ("F63", pytest.approx(0.3 * 1.06 + 0.045))
     slow = stopping(resolve_rig("sim", ["control.push_speed_m_per_s=0.04"]), FAULTS.values())
     assert slow.speed_m_per_s == 0.05, "the approach is faster"
+
+
+@pytest.mark.parametrize(
+    ("family", "counts"),
+    [("F73", "F73-hold"), ("F31", "F31-stop")],  # where no zero comes through, a hold does not brake either
+)
+def test_a_base_that_was_held_first_rolls_no_further_until_it_is_stopped(family, counts):
+    rows = (FAULTS[f"{family}-hold"], FAULTS[f"{family}-stop"])
+    found = stopping(resolve_rig("sim", ["control.push_speed_m_per_s=0.3"]), rows)
+    assert found.slowest_m == of_row(FAULTS[counts], 0.3, 1.0)
+    assert of_row(rows[0], 0.3, 1.0) < of_row(rows[1], 0.3, 1.0)
+
+
+def test_a_hold_that_takes_longer_than_the_stop_counts_as_the_stop():
+    held, stopped = (replace(FAULTS["F73-hold"], bound_ticks=500), FAULTS["F73-stop"])
+    found = stopping(resolve_rig("sim"), (held, stopped))
+    assert (found.slowest_row, found.slowest_m) == ("F73-hold", of_row(held, 0.1, 1.0))
+    assert stopping(resolve_rig("sim"), (stopped,)).slowest_m == of_row(stopped, 0.1, 1.0)

@@ -1,5 +1,6 @@
 """The supervisor by itself: the strongest reaction wins at once, lets go slowly, and STOP and DEAD never let go."""
 
+import math
 from itertools import combinations
 
 import pytest
@@ -220,6 +221,39 @@ def test_an_exception_after_a_stop_keeps_what_came_first():
     assert verdict.mode == Mode.DEAD
     assert verdict.faults == ("F23", "F68")
     assert state.stop_since_ns == 123
+
+
+def test_an_exception_is_the_first_cause_of_a_run_that_had_none():
+    state, verdict = give_up(SafetyState(mode=int(Mode.PUSHING)), GOOD)
+    assert (verdict.finished, verdict.exit_code) == (True, 1)
+    assert (state.first_fault, state.first_fault_ns) == ("F68", GOOD.now_ns)
+    assert state.mode == FAULTS["F68"].mode == Mode.STOP
+
+
+# --- the first cause -----------------------------------------------------------------------------------------------
+
+
+def test_what_held_the_run_is_the_first_cause_until_it_goes_on(say):
+    state, _ = say(SafetyState(mode=int(Mode.PUSHING)), ("F24-hold",))
+    assert (state.first_fault, state.first_fault_ns) == ("F24-hold", GOOD.now_ns)
+    for n in range(1, 100):  # held, and clean for less than a second
+        state, verdict = say(state, (), now_ns=GOOD.now_ns + n * PERIOD_NS)
+        assert (verdict.mode, state.first_fault, state.first_fault_ns) == (Mode.HOLD, "F24-hold", GOOD.now_ns)
+    while verdict.mode >= Mode.HOLD:
+        n += 1
+        state, verdict = say(state, (), now_ns=GOOD.now_ns + n * PERIOD_NS)
+    assert (state.first_fault, state.first_fault_ns) == ("", 0)
+    assert math.isnan(state.first_value)
+
+
+def test_a_first_cause_that_the_run_went_on_from_is_forgotten_with_its_number(say):
+    for mode in (Mode.PUSHING, Mode.SLOW):
+        before = SafetyState(mode=int(mode), first_fault="F24-hold", first_value=41.0, first_fault_ns=123)
+        slow = ("F40-slow",) if mode == Mode.SLOW else ()
+        state, verdict = say(before, slow)
+        assert verdict.mode == mode
+        assert (state.first_fault, state.first_fault_ns) == ("", 0)
+        assert math.isnan(state.first_value)
 
 
 # --- a pause of the host -----------------------------------------------------------------------------------------
