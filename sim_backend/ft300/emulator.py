@@ -8,15 +8,15 @@ holds the assumption.
 from __future__ import annotations
 
 import termios
-from collections.abc import Callable
 
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
-from robot_io.ipc.event_loop import EventLoop, Timer
+from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ft300 import wire
 from sim_backend.ft300.knobs import Ft300Knobs
 from sim_backend.ft300.line import WireDirection, next_delivery_ns
 from sim_backend.ft300.pty import READ_BYTES, PtyPort
 from sim_backend.ft300.registers import OUTPUT_STREAM, SensorRegisters
+from sim_backend.ft300.timers import NamedTimers, nanoseconds
 from sim_backend.world.plant import FtSource
 
 RX_STEP_NS = 2 * NS_PER_MS
@@ -52,7 +52,6 @@ class Ft300Emulator:
     ) -> None:
         self.knobs = knobs or Ft300Knobs()
         self.latency_ms = latency_ms
-        self._loop = loop
         self.source = source
         self._period_ns = NS_PER_S / rate_hz
         self._phase = phase
@@ -65,7 +64,7 @@ class Ft300Emulator:
         self._scanner = wire.RequestScanner()
         self._baud_fits = False
         self._sample_index = 0
-        self._timers: dict[str, Timer] = {}
+        self._timers = NamedTimers(loop)
         self._stop_bytes_seen = 0
         self._modbus_from_ns = 0
         self._stalled_until_ns = 0
@@ -98,13 +97,11 @@ class Ft300Emulator:
         now_ns = monotonic_ns()
         self._registers.counts = wire.to_counts(self.source.read_ft(now_ns))
         self._sample_index = int(now_ns / self._period_ns - self._phase) + 1
-        self._at("sample", self._sample_ns(), self._on_sample)
+        self._timers.at("sample", self._sample_ns(), self._on_sample)
 
     def close(self) -> None:
         """Remove the pty and stop; idempotent."""
-        for timer in self._timers.values():
-            timer.cancel()
-        self._timers.clear()
+        self._timers.cancel_all()
         self._port.close()
 
     def keep_streaming(self) -> None:
@@ -132,7 +129,7 @@ class Ft300Emulator:
             self._streaming = self._streams_at_boot
             self._registers.output = 0
         if return_after_s is not None:
-            self._at("return", monotonic_ns() + int(return_after_s * NS_PER_S), lambda _: self._port.open())
+            self._timers.at("return", monotonic_ns() + int(return_after_s * NS_PER_S), lambda _: self._port.open())
 
     # The sensor's own clock: it measures whether or not anyone is connected.
 
@@ -151,7 +148,7 @@ class Ft300Emulator:
             skipped = int(late_ns / self._period_ns) + 1
             self._sample_index += skipped
             self._counted["samples_skipped"] += skipped
-        self._at("sample", self._sample_ns(), self._on_sample)
+        self._timers.at("sample", self._sample_ns(), self._on_sample)
 
     def _send_packet(self, sample_ns: int) -> None:
         self._packets += 1
@@ -182,7 +179,7 @@ class Ft300Emulator:
         # While nobody is connected, one wake-up per packet is enough.
         arrival_ns = self._to_host.next_ns() if self._port.attached else self._to_host.free_ns
         if len(self._to_host) and arrival_ns is not None and "deliver" not in self._timers:
-            self._at("deliver", next_delivery_ns(arrival_ns, self.latency_ms), self._on_delivery)
+            self._timers.at("deliver", next_delivery_ns(arrival_ns, self.latency_ms), self._on_delivery)
 
     def _on_delivery(self, deadline_ns: int) -> None:
         # Everything due by now: after a late wake-up, all that the adapter would have delivered meanwhile.
@@ -231,7 +228,7 @@ class Ft300Emulator:
     def _schedule_hearing(self) -> None:
         if len(self._to_sensor) and "hear" not in self._timers:
             heard_ns = min(self._to_sensor.free_ns, monotonic_ns() + RX_STEP_NS)
-            self._at("hear", heard_ns, self._on_hearing)
+            self._timers.at("hear", heard_ns, self._on_hearing)
 
     def _on_hearing(self, _deadline_ns: int) -> None:
         now_ns = monotonic_ns()
@@ -264,7 +261,7 @@ class Ft300Emulator:
                 self._streaming = False
                 self._registers.output = 0
                 self._counted["stops"] += 1
-                self._modbus_from_ns = now_ns + _ns(self.knobs.mode_change_ms)
+                self._modbus_from_ns = now_ns + nanoseconds(self.knobs.mode_change_ms)
                 return data[index:]
         return b""
 
@@ -272,14 +269,16 @@ class Ft300Emulator:
         reply = self._registers.serve(request)
         selected = reply.selected
         if selected is not None:
-            self._at(
+            self._timers.at(
                 "answer",
-                now_ns + _ns(self.knobs.ack_delay_ms),
+                now_ns + nanoseconds(self.knobs.ack_delay_ms),
                 lambda at_ns: self._select(selected, reply.answer, at_ns),
             )
         elif self.knobs.unknown == "exception" or not reply.is_refusal:
             answer = self._perhaps_damaged(reply.answer)
-            self._at("answer", now_ns + _ns(self.knobs.answer_delay_ms), lambda at_ns: self._send(answer, at_ns))
+            self._timers.at(
+                "answer", now_ns + nanoseconds(self.knobs.answer_delay_ms), lambda at_ns: self._send(answer, at_ns)
+            )
 
     def _perhaps_damaged(self, answer: bytes) -> bytes:
         self._answers += 1
@@ -298,19 +297,3 @@ class Ft300Emulator:
 
     def _is_stalled(self, now_ns: int) -> bool:
         return now_ns < self._stalled_until_ns
-
-    def _at(self, name: str, deadline_ns: int, callback: Callable[[int], None]) -> None:
-        """Call back once at `deadline_ns`, unless a timer of that name is set again before."""
-
-        def fire(at_ns: int) -> None:
-            self._timers.pop(name, None)
-            callback(at_ns)
-
-        previous = self._timers.get(name)
-        if previous is not None:
-            previous.cancel()
-        self._timers[name] = self._loop.call_at(deadline_ns, fire)
-
-
-def _ns(milliseconds: float) -> int:
-    return int(milliseconds * NS_PER_MS)
