@@ -24,7 +24,7 @@ from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
-from robot_io.rig.config import rig_from_toml
+from robot_io.rig.config import RigConfig, rig_from_toml
 from robot_io.tick import TickInput, TickOutput, TickState
 from robot_io.ur10.driver import ArmLink
 from sim_backend.injection.arm import InjectedArm
@@ -75,29 +75,9 @@ def main() -> int:
         return error.exit_code
     ring = Ring(job.ring_fd)
     injection = Injection(rig.faults.inject, monotonic_ns, event_writer(ring.push, job.wall_offset_ns))
-    core = TickCore.of(rig, in_contact=job.saved_tare is not None)
     base = GateLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
-    arm = ArmLink(job.arm_record_fd)
     deadman = Deadman(FROZEN_S)
-
-    def on_status(inp: TickInput, state: TickState, output: TickOutput) -> None:
-        deadman.renew()
-        status.say("status", **status_line(inp, state, output))
-
-    watch = Watch(gate=job.gate_pidfd, arm=job.arm_pidfd, recorder=job.recorder_pidfd)
-    loop = ControlLoop(
-        core.fold,
-        initial_state(job.saved_tare),
-        rate_hz=rig.loop.rate_hz,
-        sensor_rate_hz=rig.ft.declared.rate_hz,
-        sensor=InjectedSensor(sensor, injection, rig) if injection.of("ft") else sensor,
-        arm=InjectedArm(arm, injection) if injection.of("arm") else arm,
-        base=base,
-        ring=ring,
-        watch=watch,
-        operator_fd=job.operator_fd,
-        on_status=on_status,
-    )
+    loop = _loop(job, rig, sensor, base, ring, injection, status, deadman)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     try:
         info = started(sensor, "ft", rig.ft.kind)
@@ -125,6 +105,40 @@ def main() -> int:
     base.close()  # first: the gate reads the EOF as the end and sends its last zeros
     gc.enable()
     return _finish(loop, sensor, status, rig.loop.rate_hz, injection.counts("ft", "arm"))
+
+
+def _loop(
+    job: ControlJob,
+    rig: RigConfig,
+    sensor: Sensor,
+    base: GateLink,
+    ring: Ring,
+    injection: Injection,
+    status: StatusPipe,
+    deadman: Deadman,
+) -> ControlLoop:
+    """Return the loop, which renews `deadman` and reports to `status` five times a second."""
+    core = TickCore.of(rig, in_contact=job.saved_tare is not None)
+    arm = ArmLink(job.arm_record_fd)
+
+    def on_status(inp: TickInput, state: TickState, output: TickOutput) -> None:
+        deadman.renew()
+        status.say("status", **status_line(inp, state, output))
+
+    watch = Watch(gate=job.gate_pidfd, arm=job.arm_pidfd, recorder=job.recorder_pidfd)
+    return ControlLoop(
+        core.fold,
+        initial_state(job.saved_tare),
+        rate_hz=rig.loop.rate_hz,
+        sensor_rate_hz=rig.ft.declared.rate_hz,
+        sensor=InjectedSensor(sensor, injection, rig) if injection.of("ft") else sensor,
+        arm=InjectedArm(arm, injection) if injection.of("arm") else arm,
+        base=base,
+        ring=ring,
+        watch=watch,
+        operator_fd=job.operator_fd,
+        on_status=on_status,
+    )
 
 
 def _wait_for_go(operator_fd: int, sensor: Sensor, status: StatusPipe) -> bool:
