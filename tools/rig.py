@@ -149,3 +149,14 @@ def _address_problems(rig: RigConfig) -> list[str]:
     if "base" in shipped and rig.base.url and not rig.base.url.startswith(("ws://", "wss://")):
         problems.append(f"`base.url` = {rig.base.url!r} does not start with ws:// or wss://")
     return problems
+
+
+def with_addresses(rig: RigConfig, addresses: dict[str, str]) -> RigConfig:
+    """Return the rig with the addresses of its emulators filled in."""
+    if "ft" in addresses:
+        rig = replace(rig, ft=replace(rig.ft, port=addresses["ft"]))
+    if "arm" in addresses:
+        rig = replace(rig, arm=replace(rig.arm, host=addresses["arm"]))
+    if "base" in addresses:
+        rig = replace(rig, base=replace(rig.base, url=addresses["base"]))
+    return rig

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
-from msgspec.structs import replace
 
 from robot_io.clock import monotonic_ns
 from robot_io.errors import ConfigError, EnvironmentFault, PushError
@@ -28,7 +27,7 @@ from sim_backend.ridgeback.emulator import RosbridgeEmulator
 from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.world.world import World
 from tools.kinds import is_shipped
-from tools.rig import devices_at, kinds_of
+from tools.rig import devices_at, kinds_of, with_addresses
 from tools.run.emulators import Emulator, address_of, open_emulator
 
 READY_WITHIN_S = 20.0
@@ -70,17 +69,6 @@ def emulators(rig: RigConfig, kind_folder: str, faults: Sequence[str]) -> Iterat
     finally:
         child.stop(ENDS_WITHIN_S)
         child.close()
-
-
-def with_addresses(rig: RigConfig, addresses: dict[str, str]) -> RigConfig:
-    """Return the rig with the addresses of its emulators filled in."""
-    if "ft" in addresses:
-        rig = replace(rig, ft=replace(rig.ft, port=addresses["ft"]))
-    if "arm" in addresses:
-        rig = replace(rig, arm=replace(rig.arm, host=addresses["arm"]))
-    if "base" in addresses:
-        rig = replace(rig, base=replace(rig.base, url=addresses["base"]))
-    return rig
 
 
 def spoil(loop: EventLoop, opened: Mapping[str, Emulator], faults: Sequence[str], rig: RigConfig) -> None:

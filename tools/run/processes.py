@@ -24,7 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
-from msgspec.structs import asdict, replace
+from msgspec.structs import asdict
 
 from robot_io.clock import wall_offset_ns
 from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
@@ -38,7 +38,7 @@ from safety.motion_bounds import total_bounds
 from safety.settings import SafetySettings
 from tools.kinds import is_shipped
 from tools.places.saved_tare import SavedTare
-from tools.rig import devices_at, faults_of
+from tools.rig import devices_at, faults_of, with_addresses
 from tools.run.facts.run_facts import run_facts
 from tools.run.injected_gate import InjectedGateJob
 from tools.run.jobs import ArmKindJob, ControlJob, EmulatorJob
@@ -150,17 +150,9 @@ class Processes:
 
     def _with_endpoints(self) -> RigConfig:
         """Return the rig with the addresses of its emulators filled in."""
-        rig = self._rig
         emulators = self.children.get("emulators")
         ready = (emulators.ready if emulators else None) or {}
-        addresses = ready.get("addresses", {})
-        if "ft" in addresses:
-            rig = replace(rig, ft=replace(rig.ft, port=addresses["ft"]))
-        if "arm" in addresses:
-            rig = replace(rig, arm=replace(rig.arm, host=addresses["arm"]))
-        if "base" in addresses:
-            rig = replace(rig, base=replace(rig.base, url=addresses["base"]))
-        return rig
+        return with_addresses(self._rig, ready.get("addresses", {}))
 
     def _start_recorder(self, config_text: str) -> None:
         facts = run_facts(self._rig, self._seed, in_contact=self._saved is not None)
