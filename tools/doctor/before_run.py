@@ -13,6 +13,9 @@ from tools.doctor.prove import proof_row
 from tools.kinds import name_of
 from tools.rig import kinds_of
 
+JUDGED_BY_THE_TARE = ("ft.noise", "ft.bias")
+"""The run's own tare refuses these at rest, from every packet of the stream, and its log keeps the evidence."""
+
 
 def look_before_run(rig: RigConfig, kind_folder: str) -> list[Check]:
     """Look at the real devices of a run, whose locks it has; tell failures and warnings; return every row.
@@ -32,8 +35,8 @@ def look_before_run(rig: RigConfig, kind_folder: str) -> list[Check]:
 
 
 def refusal(rig: RigConfig, checks: Sequence[Check]) -> DeviceError | None:
-    """Return the error of the checks that failed, None where none did."""
-    failed = [check for check in checks if check.result == "failed"]
+    """Return the error of the checks that failed, None where none did but what the run's tare judges itself."""
+    failed = [check for check in checks if check.result == "failed" and check.check not in JUDGED_BY_THE_TARE]
     if not failed:
         return None
     if len(failed) == 1:

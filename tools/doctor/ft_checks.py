@@ -103,13 +103,18 @@ def _others_on(rows: Rows, port: str) -> None:
 
 
 def openers(real_path: str) -> list[str]:
-    """Return the other processes that have a file open, as far as the system lets us see them."""
+    """Return the other processes that have a file open, as far as the system lets us see them.
+
+    Whoever made a pty often keeps its near end open: that is the device, not another reader.
+    """
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         if process.name == str(os.getpid()):
             continue
         try:
-            if any(str(fd.readlink()) == real_path for fd in (process / "fd").iterdir()):
+            names = {str(fd.readlink()) for fd in (process / "fd").iterdir()}
+            made_it = real_path.startswith("/dev/pts/") and bool(names & {"/dev/ptmx", "/dev/pts/ptmx"})
+            if real_path in names and not made_it:
                 found.append(f"{(process / 'comm').read_text().strip()} (process {process.name})")
         except OSError:  # not ours to see, or gone
             continue

@@ -4,11 +4,15 @@ import os
 import pty
 import resource
 import shutil
+import subprocess
+import sys
+from subprocess import PIPE
 from types import SimpleNamespace
 
 import pytest
 
 from tools.doctor import ft_checks, host_checks
+from tools.doctor.ft_checks import openers
 from tools.doctor.host_checks import host_checks as check_host
 from tools.doctor.rig_checks import rig_checks
 from tools.rig import resolve_rig
@@ -97,3 +101,18 @@ def test_what_the_rig_says_of_itself(settings, check, result):
     row = by_name(rig_checks(resolve_rig("emulated", settings)))[check]
     assert row.result == result, row
     assert bool(row.fix) == (result != "ok")
+
+
+def test_who_made_a_pty_is_no_other_reader_of_it_and_who_only_opened_it_is():
+    """A proxy in front of the sensor keeps the near end of its pty open."""
+    made = "import os, sys; master, near = os.openpty(); print(os.ttyname(near), flush=True); sys.stdin.read()"
+    opened = "import os, sys; fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print('open', flush=True); sys.stdin.read()"
+    with subprocess.Popen([sys.executable, "-c", made], stdin=PIPE, stdout=PIPE, text=True) as maker:
+        path = maker.stdout.readline().strip()
+        assert openers(path) == []
+        with subprocess.Popen([sys.executable, "-c", opened, path], stdin=PIPE, stdout=PIPE, text=True) as reader:
+            assert reader.stdout.readline() == "open\n"
+            [found] = openers(path)
+            assert found.endswith(f"(process {reader.pid})")
+            reader.stdin.close()
+        maker.stdin.close()
