@@ -106,8 +106,9 @@ def test_what_the_rig_says_of_itself(settings, check, result):
 def test_who_made_a_pty_is_no_other_reader_of_it_and_who_only_opened_it_is():
     """A proxy in front of the sensor keeps the near end of its pty open."""
     made = "import os, sys; master, near = os.openpty(); print(os.ttyname(near), flush=True); sys.stdin.read()"
-    opened = "import os, sys; fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print('open'); "
-        "sys.stdout.flush(); sys.stdin.read()"
+    opened = (
+        "import os, sys; os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print('open', flush=True); sys.stdin.read()"
+    )
     with subprocess.Popen([sys.executable, "-c", made], stdin=PIPE, stdout=PIPE, text=True) as maker:
         path = maker.stdout.readline().strip()
         assert openers(path) == []
