@@ -35,7 +35,7 @@ class Part(ABC):
 
     def items(self, counts: Iterator[int]) -> list[Item]:
         """Return the numbers of a fixed part, or of a sequence that has the next of `counts` elements."""
-        raise NotImplementedError
+        raise NotImplementedError  # a part that is written by a WriterCall is never asked for its numbers
 
     @abstractmethod
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
