@@ -57,6 +57,11 @@ COMMANDS = {
         "figures and one self-contained page of a log",
         ("push report runs/demo/run.mcap", "push report runs/demo/run.mcap --json"),
     ),
+    "view": Command(
+        "tools.commands.view",
+        "layouts for Rerun, Lichtblick and Foxglove; opens one that is installed",
+        ("push view runs/demo", "push view runs/demo --out layouts --json"),
+    ),
     "log": Command(
         "tools.commands.log",
         "inspect, export or repair a log",
