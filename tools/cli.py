@@ -91,7 +91,7 @@ COMMANDS = {
         ("push config show emulated --set control.k_f=0.1", "push config check my-rig.toml"),
     ),
     "completion": Command(
-        "tools.commands.completion",
+        "tools.completion",
         "the script by which bash or zsh complete commands and options",
         ("push completion bash", "push completion zsh"),
     ),

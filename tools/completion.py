@@ -1,10 +1,14 @@
-"""`push completion bash|zsh`: print the script by which a shell completes commands, options and paths."""
+"""`push completion bash|zsh`: print the script by which a shell completes commands, options and paths.
+
+Above `cli` and not among the commands, because it reads the table of all of them.
+"""
 
 from __future__ import annotations
 
 import argparse
 import importlib
 
+from tools.cli import COMMANDS
 from tools.terminal.arguments import name_or_path, named_path
 
 SHELLS = ("bash", "zsh")
@@ -25,8 +29,6 @@ def run(args: argparse.Namespace) -> int:
 
 def whole_parser() -> argparse.ArgumentParser:
     """Return one parser of every command with all its options, which the program itself never builds."""
-    from tools.cli import COMMANDS
-
     root = argparse.ArgumentParser(prog="push")
     root.add_argument("--version", action="store_true", help="the version")
     commands = root.add_subparsers()
