@@ -43,7 +43,8 @@ class WhatIfResult(msgspec.Struct, frozen=True):
     """In how many of them anything differs."""
     first: First | None
     exact_to_tick: int | None
-    """Up to here the answer is exact: the first tick with another safe command, mode or end; None if there is none."""
+    """Up to here the answer is exact: the first tick with another safe command, mode or end than the log has, because
+    of the settings or of today's program; None if there is none."""
     parts: dict[str, PartResult]
     new_faults: tuple[OtherFault, ...]
     missing_faults: tuple[OtherFault, ...]
@@ -85,6 +86,8 @@ class WhatIf:
         """Return what was found. notes: said in front of those of the comparison."""
         parts = {name: part.result() for name, part in self._parts.items()}
         reached = [first.tick for name in _REACHES_THE_ROBOT if (first := parts[name].first)]
+        if self._other_code_from is not None:
+            reached.append(self._other_code_from)
         return WhatIfResult(
             tuple(settings),
             self._ticks,
