@@ -240,6 +240,11 @@ def test_what_is_no_setting_is_usage(setting, sim_log, capsys):
     assert told["error"]["where"].startswith("--what-if")
 
 
+def test_a_tolerance_is_refused_beside_it(sim_log, capsys):
+    code, told = replayed(capsys, sim_log, "--what-if", "control.k_f=0.1", "--tolerance", "1e-9")
+    assert (code, told["error"]["where"]) == (2, "push replay")
+
+
 def test_a_gap_before_the_first_difference_is_bridged_by_the_log_s_state(
     sim_ticks, pushing_at, write_log, tmp_path, capsys
 ):
