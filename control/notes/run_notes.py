@@ -20,12 +20,17 @@ class RunNotes:
         self.events: list[dict[str, object]] = []
         self.fault_counts: dict[str, int] = {}
         self.course = PushCourse()
+        self.pauses = 0
+        self.paused_ns = 0
         self._last: tuple[str, ...] = ()
+        self._paused_since_ns = 0
         self._first_ns = 0
 
     def note(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
         """Record one tick and the state after it."""
-        self.course.note(after.control.phase, after.control.lateral_m)
+        x, y, _ = after.control.force_world
+        self.course.note(after.control.phase, after.control.lateral_m, math.hypot(x, y))
+        self._note_pause(inp)
         if not self._first_ns:
             self._first_ns = inp.now_ns
         for fault in output.faults:
@@ -44,7 +49,19 @@ class RunNotes:
 
     def figures(self) -> dict[str, object]:
         """Return the notes as part of a run's figures."""
-        return {"events": self.events, "fault_counts": self.fault_counts, **self.course.figures()}
+        pauses = {"pauses": self.pauses, "paused_s": round(self.paused_ns * 1e-9, 2)}
+        return {"events": self.events, "fault_counts": self.fault_counts, **pauses, **self.course.figures()}
+
+    def _note_pause(self, inp: TickInput) -> None:
+        """Count the operator's pauses and how long they were."""
+        if not inp.paused:
+            self._paused_since_ns = 0
+            return
+        if self._paused_since_ns:
+            self.paused_ns += inp.now_ns - self._paused_since_ns
+        else:
+            self.pauses += 1
+        self._paused_since_ns = inp.now_ns
 
 
 def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:

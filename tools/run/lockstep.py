@@ -97,6 +97,7 @@ class Lockstep:
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
         self.notes = RunNotes()
         self.operator = Operator.NONE
+        self.paused = False
 
     def run(self, on_tick: Callable[[TickInput, TickState, TickOutput], None]) -> dict[str, Any]:
         """Run to the end and return the figures; `on_tick` is called after each tick (to pace and to display)."""
@@ -141,6 +142,7 @@ class Lockstep:
             ft_input(readings, self._ft_edge.health(), 0),
             self._arm_edge.read() or ArmRecord(),
             self._gate.record,
+            self.paused,
         )
         try:
             after, output = self._core.fold(self._state, inp)
