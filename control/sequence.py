@@ -33,8 +33,7 @@ def advance(
 ) -> ControlState:
     """Return the state after the phase logic of one tick.
 
-    contact: the ball centre in the WORLD frame. held: the supervisor held the base in the previous tick, or the operator
-    has paused the run.
+    contact: the ball centre in the WORLD frame. held: the supervisor held the base in the tick before, or it is paused.
     """
     along = settings.path.along(*contact)
     progress = along - state.contact_from_m if state.contact_seen else 0.0
