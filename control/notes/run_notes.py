@@ -75,6 +75,7 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "faults": list(output.faults),
         "distance_m": control.end_progress_m if ended else control.progress_m,
         "lateral_error_m": control.end_lateral_m if ended else control.lateral_m,
+        "first_tick_ns": safety.first_ns,
         "first_fault": safety.first_fault,
         "first_value": safety.first_value if math.isfinite(safety.first_value) else None,
         "first_fault_s": (safety.first_fault_ns - safety.first_ns) * 1e-9 if safety.first_fault else None,

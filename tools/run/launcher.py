@@ -36,6 +36,7 @@ from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
 from tools.terminal.start_errors import combined_error, start_timeout
+from tools.verdict.first_cause import with_dead_emulators
 from tools.verdict.object_pose import ObjectPose, object_pose
 from tools.verdict.witness import Witness, witness_of
 
@@ -85,6 +86,7 @@ class Launcher:
         self._children = self._processes.children
         self._began = self._ending = self._paused = self._killed_by_operator = False
         self._stop_asked_ns = self._status_ns = 0
+        self._emulators_died_ns = 0
         self._gate_latch = ""
 
     def run(self) -> dict[str, Any]:
@@ -181,6 +183,7 @@ class Launcher:
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
             if child.name == "emulators" and not self._ending:
+                self._emulators_died_ns = monotonic_ns()
                 self._live.say("the emulators have ended: every emulated device is gone")
 
     def _wait_ready(self, names: list[str], within_ns: int) -> None:
@@ -279,4 +282,4 @@ class Launcher:
         rate_hz, killed = self._rig.loop.rate_hz, self._killed_by_operator
         figures, notes = final_figures(self._children["control"], self.log, rate_hz, killed_by_operator=killed)
         self.notes += notes
-        return figures
+        return with_dead_emulators(figures, self._emulators_died_ns)
