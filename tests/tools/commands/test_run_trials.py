@@ -11,7 +11,9 @@ import time
 import pytest
 
 from robot_io.mcap.read import read_summary
+from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished, one_error, started
+from tests.tools.commands.test_run_asks_first import robot
 from tools.places.trials_folder import read_trials, trial_folders
 
 SIM = ("run", "sim", "--fast", *QUICK, "--distance-m", "0.1")
@@ -121,3 +123,31 @@ def test_a_note_is_on_the_page_of_its_run(state, tmp_path):
     words = [word for word in SIM if word != "--no-report"]
     finished(state, *words, "--note", "barrel <half> full", "--out", str(tmp_path / "run"))
     assert "barrel &lt;half&gt; full" in (tmp_path / "run" / "report.html").read_text()
+
+
+@pytest.mark.long
+@repeated_when_the_host_stalls
+def test_a_real_robot_is_looked_at_again_and_moves_on_enter_only(state, tmp_path, host):
+    """The robot is emulated behind loopback. What was typed before the question counts for nothing."""
+    out = tmp_path / "out"
+    ours, theirs = pty.openpty()
+    try:
+        with robot(tmp_path) as rig:
+            argv = ("run", rig, "--move-robot", "--yes", *QUICK, "--distance-m", "0.1", "--trials", "3")
+            with started(state, *argv, "--out", str(out), "--json", stdin=theirs, host=host) as run:
+                run.wait_for(r"trial-01/run\.mcap")
+                run.wait_for(r"Trial 2 of 3 is next\. Put the object back and clear the floor: the robot moves as soon")
+                assert not (out / "trial-02").exists()
+                os.write(ours, b"\n")
+                run.wait_for(r"Trial 3 of 3 is next")
+                os.write(ours, b"q\n")
+                ended = run.wait()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    trials = ended.last_object["trials"]
+    assert [trial["folder"] for trial in trials] == ["trial-01", "trial-02"]
+    assert trials[0]["verdict"] in ("done", "off the line"), ended.err
+    assert trials[1]["verdict"] != "not started", "where nobody has put the object back, it may be missed"
+    assert ended.err.count("looking at the devices; nothing moves yet") == 2
+    assert ended.last_object["level"] == "hardware"
