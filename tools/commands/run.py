@@ -14,6 +14,7 @@ from robot_io.tick import TickInput, TickOutput, TickState
 from tools.commands.run_outputs import save_tare, write_report, write_summary
 from tools.places import run_dir, saved_tare
 from tools.places.device_locks import DeviceLocks
+from tools.places.running import announced
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
@@ -217,7 +218,8 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
 
     try:
         try:
-            figures = one.run(on_tick)
+            with announced(rig, out / "run.mcap"):
+                figures = one.run(on_tick)
         finally:
             log.finish({})
     except OSError as error:  # only the log is outside this process here

@@ -138,7 +138,7 @@ class Launcher:
         names = self._processes.start_remaining(run_dir.write_config(self._out, self._rig))
         pids = {"launcher": os.getpid(), **self._processes.pids}
         write_json(self._out / "processes.json", {"schema": 1, **pids})
-        announce(self._rig, pids)
+        announce(self._rig, pids, self.log)
         self._wait_ready(names, READY_NS)
         self._warn_without_realtime()
         if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full

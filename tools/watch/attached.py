@@ -1,0 +1,71 @@
+"""Watches a run under way through its log, in a process of its own; the run knows nothing of it."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from mcap.records import Attachment
+
+from robot_io.errors import EnvironmentFault, PushError
+from robot_io.ipc.spawn import spawn
+from robot_io.log.log_format import LOG_FORMAT
+from robot_io.mcap.log_file import CONFIG_ATTACHMENT
+from robot_io.mcap.walk import walk
+from robot_io.rig.config import RigConfig
+from robot_io.rig.logged import rig_of_log
+from tools.places.running import RunningRun
+from tools.watch.reports import Report, RunEnded, report_link
+from tools.watch.run_process import FollowJob
+
+ENDS_WITHIN_S = 1.0
+BEGUN_WITHIN_S = 5.0
+POLL_S = 0.05
+
+
+class AttachedRun:
+    """The process that follows a run's log; `with` ends it."""
+
+    def __init__(self, run: RunningRun) -> None:
+        self.reports, far = report_link()
+        job = FollowJob(run, far.fileno(), os.getpid())
+        self._child = spawn("run-watch", "tools.watch.run_process", job, [far.fileno()])
+        far.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._child.stop(ENDS_WITHIN_S)
+        self._child.close()
+        self.reports.close()
+
+    def read(self) -> list[Report]:
+        """Return what came since the last call. Raises PushError when the log cannot be followed."""
+        ended = self._child.process.poll() is not None  # looked at first: all that it said is there by then
+        told = self.reports.read()
+        if ended and not any(isinstance(report, RunEnded) for report in told):
+            self._child.hear()
+            if self._child.errors:
+                raise self._child.errors[0]
+            raise EnvironmentFault(f"the process that reads the log {self._child.how_it_ended()}")
+        return told
+
+
+def rig_of_run(run: RunningRun) -> RigConfig:
+    """Return the rig of a run as its log has it. Raises PushError when the log cannot be read."""
+    log, until_s = Path(run.log), time.monotonic() + BEGUN_WITHIN_S
+    while True:
+        try:
+            for item in walk(log, grown=lambda _: log.stat().st_size):
+                if isinstance(item, Attachment) and item.name == CONFIG_ATTACHMENT:
+                    return rig_of_log(item.data.decode(), LOG_FORMAT, run.log).rig
+        except PushError:
+            if time.monotonic() > until_s:
+                raise
+        time.sleep(POLL_S)  # the recorder has not flushed its first bytes yet
