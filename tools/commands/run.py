@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools.commands.run_outputs import save_tare, write_report, write_summary
+from tools.live.arguments import add_live_arguments
+from tools.live.view import check_live, live_view
 from tools.places import run_dir, saved_tare
 from tools.places.device_locks import DeviceLocks
 from tools.places.running import announced
@@ -67,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--drive-blind", action="store_true", help="let a real base move although its sensor or arm is emulated"
     )
+    add_live_arguments(parser)
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
@@ -94,7 +98,11 @@ def run(args: argparse.Namespace) -> int:
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
-            summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
+            if simulated:
+                with live_view(args.live_port if args.live else None) as to_view:
+                    summary = run_lockstep(args, rig, out, saved, to_view)
+            else:
+                summary = run_wall_clock(args, rig, out, saved)
         except BaseException:
             if early is not None:
                 early.drop()
@@ -148,6 +156,8 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
     check_room(rig, args.seed)
+    if args.live:
+        check_live(args.live_port, fast=args.fast)
 
 
 def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
@@ -170,7 +180,15 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
         allow_descriptors(MOST_DESCRIPTORS)
 
-        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
+        launcher = Launcher(
+            rig,
+            out,
+            seed=args.seed,
+            saved=saved,
+            live=LiveLine(rig),
+            kind_folder=folder_of(args.rig),
+            live_port=args.live_port if args.live else None,
+        )
         with awake():
             figures = launcher.run()
     except BaseException:
@@ -193,12 +211,14 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
     return with_injected(summary, launcher.injected(figures))
 
 
-def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
-    """Run level sim in this process and return its summary."""
+def run_lockstep(
+    args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None, to_view: socket.socket | None = None
+) -> dict[str, Any]:
+    """Run level sim in this process and return its summary. to_view: of a live view."""
     from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
     text = run_dir.write_config(out, rig)
-    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, to_view=to_view)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved)
     except PushError:  # an impossible world: nothing has started

@@ -8,6 +8,8 @@ from pathlib import Path
 from robot_io.error_report import tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.rig.config import RigConfig
+from tools.live.arguments import add_live_arguments
+from tools.live.view import check_live, live_view
 from tools.places.device_locks import FreeDevices
 from tools.places.running import RunningRun
 from tools.rig import devices_at, folder_of, resolve_rig
@@ -23,12 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
     )
     parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
+    add_live_arguments(parser)
     parser.add_argument("--json", action="store_true", help="a line of JSON five times a second")
 
 
 def run(args: argparse.Namespace) -> int:
     """Show until q or Ctrl-C, or until the run that is watched has ended; return 0. Raises PushError."""
     rig = resolve_rig(args.rig, args.overrides)
+    if args.live:
+        check_live(args.live_port)
     found = run_to_watch(rig)
     if found is not None:
         return watch_run(args, found)
@@ -46,7 +51,7 @@ def watch_run(args: argparse.Namespace, found: RunningRun) -> int:
     from tools.watch.attached import AttachedRun, rig_of_run
 
     seen = Seen(rig_of_run(found))
-    with AttachedRun(found) as attached:
+    with live_view(args.live_port if args.live else None) as to_view, AttachedRun(found, to_view) as attached:
         why = Show(seen, attached, f"the run in {Path(found.log).parent}", as_json=args.json).run()
     if why:
         tell(why)
@@ -56,6 +61,8 @@ def watch_run(args: argparse.Namespace, found: RunningRun) -> int:
 def watch_devices(args: argparse.Namespace, rig: RigConfig) -> int:
     """Open the devices and show them."""
     from tools.doctor.emulated import emulators
+    from tools.live.feed import LiveFeed
+    from tools.watch.live_topics import LiveTopics
     from tools.watch.own_devices import OwnDevices
 
     folder = folder_of(args.rig)
@@ -66,6 +73,11 @@ def watch_devices(args: argparse.Namespace, rig: RigConfig) -> int:
                 where="push watch",
                 do="Wait for it; once a run has started, `push watch` attaches to it",
             )
-        with emulators(rig, folder, ()) as served, OwnDevices(served, folder, free.held) as devices:
-            Show(Seen(rig), devices, "devices opened here", as_json=args.json).run()
+        with (
+            live_view(args.live_port if args.live else None) as to_view,
+            emulators(rig, folder, ()) as served,
+            OwnDevices(served, folder, free.held) as devices,
+        ):
+            topics = LiveTopics(served, LiveFeed(to_view)) if to_view is not None else None
+            Show(Seen(served), devices, "devices opened here", as_json=args.json, topics=topics).run()
     return 0

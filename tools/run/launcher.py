@@ -2,6 +2,7 @@
 
     emulators   one process with the world and its wire servers (emulated devices only)
     recorder    drains the log rings into run.mcap, finishes it when control has ended
+    live        serves what is recorded to viewers (with --live); nothing depends on it
     gate        sole holder of the base connection
     arm         the ur_rtde library, publishing a shared record
     control     the loop: sensor, law, supervisor, envelope, one frame to the gate per tick
@@ -27,11 +28,13 @@ from robot_io.rig.config import RigConfig
 from robot_io.rig.fault_words import parse_fault
 from safety.gate import Latch
 from tools.kinds import name_of
+from tools.live.view import where_words
 from tools.places import run_dir
 from tools.places.atomic_file import write_json
 from tools.places.running import announce, forget
 from tools.places.saved_tare import SavedTare
 from tools.run.facts.figures_from_log import figures_from_log
+from tools.run.process_notes import process_notes, warn_without_realtime
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
@@ -55,7 +58,7 @@ BEAT_NS = NS_PER_S // 10
 """How often control is told that the launcher lives: silent for 0.5 s, the base holds, for 2 s, it stops (F73)."""
 SECOND_STOP_NS = NS_PER_S
 """A second stop counts only this long after the first: `timeout` and shells may send one stop twice."""
-ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0}
+ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0, "live": 1.0}
 """Processes in the order in which they end."""
 
 
@@ -63,7 +66,15 @@ class Launcher:
     """One run at level emulated, hardware or a mix; `run` returns its final figures, `notes` holds further remarks."""
 
     def __init__(
-        self, rig: RigConfig, out: Path, *, seed: int, saved: SavedTare | None, live: LiveLine, kind_folder: str
+        self,
+        rig: RigConfig,
+        out: Path,
+        *,
+        seed: int,
+        saved: SavedTare | None,
+        live: LiveLine,
+        kind_folder: str,
+        live_port: int | None = None,
     ) -> None:
         self._rig = rig
         self._out = out
@@ -72,7 +83,13 @@ class Launcher:
         self.log = out / "run.mcap"
         self.notes: list[str] = []
         self._processes = Processes(
-            rig, seed=seed, saved=saved, log=self.log, kind_folder=kind_folder, on_spawn=self._listen
+            rig,
+            seed=seed,
+            saved=saved,
+            log=self.log,
+            kind_folder=kind_folder,
+            live_port=live_port,
+            on_spawn=self._listen,
         )
         self._children = self._processes.children
         self._began = self._ending = self._killed_by_operator = False
@@ -91,7 +108,7 @@ class Launcher:
                 self._end()
                 keys.close()
                 self._loop.close()
-            self._note_process_failures()
+            self.notes += process_notes(self._children)
             return self._figures()
         finally:
             self._live.close()
@@ -140,19 +157,16 @@ class Launcher:
         write_json(self._out / "processes.json", {"schema": 1, **pids})
         announce(self._rig, pids, self.log)
         self._wait_ready(names, READY_NS)
-        self._warn_without_realtime()
+        warn_without_realtime(self._children, self._live.say)
         if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full
             raise errors[0]
         self._began = True
         self._processes.send_to_control(b"G")
 
-    def _warn_without_realtime(self) -> None:
-        plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
-        if plain:
-            self._live.say(f"no permission for real-time priority for {', '.join(plain)}: only 100 Hz is supported")
-
     def _listen(self, child: Child) -> None:
         self._loop.add_fd(child.status.fd, lambda _events: self._hear(child))
+        if child.name == "live":
+            self._live.say(where_words(child))
 
     def _hear(self, child: Child) -> None:
         for event in child.hear():
@@ -174,6 +188,8 @@ class Launcher:
             self._loop.remove_fd(child.status.fd)
             if child.name == "emulators" and not self._ending:
                 self._live.say("the emulators have ended: every emulated device is gone")
+            elif child.name == "live" and not self._ending:
+                self._live.say("the live view has ended; the run goes on")
 
     def _wait_ready(self, names: list[str], within_ns: int) -> None:
         """Wait until all are ready. Raises PushError naming everything that failed and what to do about each."""
@@ -258,20 +274,6 @@ class Launcher:
 
     def _finished_event(self, name: str) -> dict[str, Any]:
         return self._children[name].finished or {}
-
-    def _note_process_failures(self) -> None:
-        """Note what went wrong in the processes other than control."""
-        for name in ("gate", "emulators", "arm", "recorder"):
-            child = self._children.get(name)
-            if child is not None and child.errors:
-                self.notes.append(f"{name}: {child.errors[-1].what}")
-            elif child is not None and child.process.returncode != 0:
-                self.notes.append(f"the {name} process {child.how_it_ended()}")
-        recorded = self._finished_event("recorder")
-        if not recorded.get("complete", False):
-            self.notes.append("the log is not complete: `push log recover` may repair it")
-        if dropped := sum(recorded.get("dropped", {}).values()):
-            self.notes.append(f"{dropped} records did not fit into the log's ring buffers")
 
     def _figures(self) -> dict[str, Any]:
         """Return control's figures, or those from the log if control could not report them."""

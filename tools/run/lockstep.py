@@ -6,6 +6,7 @@ Two runs with the same rig and seed give identical files: log times start at a f
 from __future__ import annotations
 
 import signal
+import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -36,6 +37,7 @@ from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
 from tools.kinds import is_shipped, name_of
+from tools.live.feed import LiveFeed
 from tools.log.run_log import RunLog
 from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
@@ -196,10 +198,13 @@ class Lockstep:
         )
 
 
-def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
-    """Open the log of a lockstep run; its facts hold nothing that differs from run to run."""
+def open_log(
+    path: Path, config_text: str, seed: int, *, in_contact: bool, to_view: socket.socket | None = None
+) -> RunLog:
+    """Open the log of a lockstep run; its facts hold nothing that differs from run to run. to_view: a live view's."""
     facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact)
-    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
+    also = LiveFeed(to_view).add if to_view is not None else None
+    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS, also=also)
 
 
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:

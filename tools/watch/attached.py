@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import time
 from pathlib import Path
 from types import TracebackType
@@ -27,12 +28,13 @@ POLL_S = 0.05
 
 
 class AttachedRun:
-    """The process that follows a run's log; `with` ends it."""
+    """The process that follows a run's log; `with` ends it. to_view: where it feeds a live view, if there is one."""
 
-    def __init__(self, run: RunningRun) -> None:
+    def __init__(self, run: RunningRun, to_view: socket.socket | None = None) -> None:
         self.reports, far = report_link()
-        job = FollowJob(run, far.fileno(), os.getpid())
-        self._child = spawn("run-watch", "tools.watch.run_process", job, [far.fileno()])
+        fds = [far.fileno(), *([to_view.fileno()] if to_view is not None else [])]
+        job = FollowJob(run, far.fileno(), os.getpid(), fds[1] if to_view is not None else -1)
+        self._child = spawn("run-watch", "tools.watch.run_process", job, fds)
         far.close()
 
     def __enter__(self) -> Self:

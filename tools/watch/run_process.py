@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 import time
 from collections import deque
@@ -19,11 +20,13 @@ from mcap.records import Message, Metadata
 from robot_io.errors import LogDamaged, PushError
 from robot_io.ipc.process import die_with_parent
 from robot_io.ipc.status import StatusPipe
+from robot_io.log.channels import BY_TOPIC
 from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
 from robot_io.mcap.log_file import RUN_METADATA
 from robot_io.mcap.walk import Topic, walk
 from robot_io.tick import TICK_CDR, ControlTick, FtReading
+from tools.live.feed import LiveFeed
 from tools.log.derivation import TICK_TOPIC
 from tools.places.running import RunningRun
 from tools.watch.reports import ReportSender, RunEnded, RunReport
@@ -41,16 +44,20 @@ class FollowJob(msgspec.Struct, frozen=True):
     run: RunningRun
     report_fd: int
     parent_pid: int
+    live_fd: int = -1
+    """Leads to a live view; -1: there is none."""
     status_fd: int = -1
 
 
 class RunFollower:
     """Reads a log while it grows and reports its newest ticks whenever it has caught up."""
 
-    def __init__(self, run: RunningRun, reports: ReportSender) -> None:
+    def __init__(self, run: RunningRun, reports: ReportSender, live: LiveFeed | None) -> None:
         self._run = run
         self._log = Path(run.log)
         self._reports = reports
+        self._live = live
+        self._caught_up = False
         self._type: LoggedType[ControlTick] | None = None
         self._payloads: deque[bytes] = deque(maxlen=MOST_TICKS)
 
@@ -67,13 +74,19 @@ class RunFollower:
                     if item.channel.topic == TICK_TOPIC:
                         schema = item.schema
                         self._type = LoggedType(TICK_CDR, schema.name, schema.data.decode(), log_format)
-                elif isinstance(item, Message) and channels[item.channel_id] == TICK_TOPIC:
-                    self._payloads.append(item.data)
+                elif isinstance(item, Message):
+                    self._message(channels[item.channel_id], item)
         except LogDamaged:
             if self._run.alive():
                 raise
             return NOT_WHOLE
         return f"the run has ended; its log is {self._log}"
+
+    def _message(self, topic: str, message: Message) -> None:
+        if topic == TICK_TOPIC:
+            self._payloads.append(message.data)
+        if self._live is not None and (self._caught_up or BY_TOPIC[topic].latched):
+            self._live.add(topic, message.log_time, message.data)
 
     def _grown(self, wanted: int) -> int:
         while True:
@@ -86,6 +99,9 @@ class RunFollower:
 
     def _report(self) -> None:
         """Report what came since the last time, if there is anything."""
+        self._caught_up = True
+        if self._live is not None:
+            self._live.flush()
         if not self._payloads or self._type is None:
             return
         ticks = [self._type.decode(payload) for payload in self._payloads]
@@ -105,8 +121,9 @@ def main() -> int:
     die_with_parent(job.parent_pid, signal.SIGTERM)
     os.nice(NICENESS)
     reports = ReportSender(job.report_fd)
+    live = LiveFeed(socket.socket(fileno=job.live_fd)) if job.live_fd >= 0 else None
     try:
-        reports.send(RunEnded(RunFollower(job.run, reports).follow()))
+        reports.send(RunEnded(RunFollower(job.run, reports, live).follow()))
     except PushError as error:
         StatusPipe(job.status_fd).error(error)
         return error.exit_code

@@ -63,7 +63,7 @@ def _force(view: View, columns: int, *, unicode: bool) -> list[Line]:
     sign = Line(f"{arrow}  {_said(force)}{axes}", "sign")
     path = f"PATH   {_numbers(force.path)} N" if force.path is not None else "PATH   the heading is not known"
     rows = [
-        f"on the ball{'x':>8}{'y':>9}{'z':>9}",
+        f"on ball{'x':>8}{'y':>9}{'z':>9}",
         f"SENSOR {_numbers(force.sensor)} N",
         f"BODY   {_numbers(force.body)} N",
         path,

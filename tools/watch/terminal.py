@@ -106,7 +106,7 @@ class Terminal:
         rows = shutil.get_terminal_size((COLUMNS, ROWS)).lines
         styles = _STYLES if self._colour else _PLAIN_STYLES
         shown = [f"{styles[style]}{text}\x1b[0m" if style in styles else text for text, style in lines[:rows]]
-        self._write("\x1b[H" + "\x1b[K\r\n".join(shown) + "\x1b[K\x1b[J")
+        self._write("\x1b[H" + "\x1b[K\n".join(shown) + "\x1b[K\x1b[J")
 
     @staticmethod
     def _write(text: str) -> None:

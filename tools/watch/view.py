@@ -17,8 +17,8 @@ from tools.watch.ball_force import BallForce, ball_force, mean_force
 from tools.watch.seen import Link, Seen, Stage
 
 SCHEMA = 1
-LATE_MS = {"ft": 50.0, "arm": 50.0, "pose": 250.0, "odometry": 250.0, "status": 4000.0}
-"""Data older than this are marked: several periods of each."""
+LATE_MS = {"ft": 150.0, "arm": 150.0, "pose": 250.0, "odometry": 250.0, "status": 4000.0}
+"""Data older than this are marked: several periods of each, and the 50 ms between two reports."""
 
 
 class Feed(msgspec.Struct, frozen=True):
