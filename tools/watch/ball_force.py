@@ -51,6 +51,7 @@ _AROUND = (
 )
 _UP, _DOWN = Direction("UP", "+z", "⊙", "o"), Direction("DOWN", "-z", "⊗", "x")
 _NONE = Direction("no force", "", "·", ".")
+_UNKNOWN = Direction("NOT A NUMBER", "", "?", "?")
 
 
 def ball_force(
@@ -72,8 +73,10 @@ def ball_force(
 
 def direction(body: Vector3) -> Direction:
     """Return where a force (N, BODY frame) points: one of eight directions on the floor, up, down, or none."""
+    if not all(map(math.isfinite, body)):
+        return _UNKNOWN
     level = math.hypot(body[0], body[1])
-    if not math.hypot(level, body[2]) >= LEAST_N:
+    if math.hypot(level, body[2]) < LEAST_N:
         return _NONE
     if abs(body[2]) > level:
         return _UP if body[2] > 0.0 else _DOWN
@@ -89,7 +92,7 @@ def drawing(body: Vector3, *, rows: int = 7, unicode: bool = True) -> list[str]:
     grid = [[" "] * (4 * half + 1) for _ in range(rows)]
     towards = direction(body)
     level = math.hypot(body[0], body[1])
-    if level > 0.0 and towards not in (_NONE, _UP, _DOWN):
+    if towards in _AROUND:
         ahead, left = body[0] / level, body[1] / level
         for step in range(1, half + 1):
             row, column = half - round(step * ahead), 2 * half - round(2 * step * left)

@@ -8,6 +8,7 @@ which sends it nothing, and the base is subscribed to, never advertised or publi
 from __future__ import annotations
 
 import signal
+import socket
 import sys
 import time
 from typing import Any, Protocol, Self
@@ -171,7 +172,7 @@ def main() -> int:
     signal.signal(signal.SIGTERM, _end)
     die_with_parent(job.parent_pid, signal.SIGTERM)
     try:
-        watch(rig_from_toml(job.rig_toml), job, ReportSender(job.report_fd))
+        watch(rig_from_toml(job.rig_toml), job, ReportSender(socket.socket(fileno=job.report_fd)))
     except PushError as error:  # a driver of somebody else that cannot be used
         StatusPipe(job.status_fd).error(error)
         return error.exit_code

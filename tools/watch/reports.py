@@ -53,8 +53,8 @@ _MOST_BYTES = 1 << 18
 class ReportSender:
     """The sending end; a report that does not fit now is lost, never waited for."""
 
-    def __init__(self, fd: int) -> None:
-        self._socket = socket.socket(fileno=fd)
+    def __init__(self, sender: socket.socket) -> None:
+        self._socket = sender
         self._socket.setblocking(False)
 
     def send(self, report: Report) -> None:

@@ -120,7 +120,7 @@ def main() -> int:
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=FollowJob)
     die_with_parent(job.parent_pid, signal.SIGTERM)
     os.nice(NICENESS)
-    reports = ReportSender(job.report_fd)
+    reports = ReportSender(socket.socket(fileno=job.report_fd))
     live = LiveFeed(socket.socket(fileno=job.live_fd)) if job.live_fd >= 0 else None
     try:
         reports.send(RunEnded(RunFollower(job.run, reports, live).follow()))

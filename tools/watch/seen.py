@@ -96,6 +96,7 @@ class Seen:
         """Take in what a device of our own gave."""
         if report.device == "ft" and report.state == "opening" and self.links["ft"].state != "opening":
             self.tare.begin()  # a sensor that was away may have lost its power, and its bias with it
+            self.readings.clear()
         self.links[report.device] = Link(report.state, report.cause)
         readings = tuple(
             FtReading(
