@@ -79,7 +79,9 @@ class RunFollower:
         except LogDamaged:
             if self._run.alive():
                 raise
+            self._report()
             return NOT_WHOLE
+        self._report()
         return f"the run has ended; its log is {self._log}"
 
     def _message(self, topic: str, message: Message) -> None:

@@ -72,6 +72,8 @@ class Show:
                 if now_ns >= shown_ns:
                     self._show(view, terminal)
                     shown_ns = now_ns + period_ns
+            if self._ended and terminal is None:
+                self._show(self._view(monotonic_ns()), None)
         return self._ended
 
     def _take(self) -> None:

@@ -36,6 +36,7 @@ class Viewer:
                 time.sleep(0.05)
         self.channels = {}
         self._topics = {}
+        self._waiting = []
 
     def __enter__(self):
         return self
@@ -48,7 +49,8 @@ class Viewer:
         deadline_s = time.monotonic() + within_s
         while topic not in self.channels:
             assert time.monotonic() < deadline_s, f"{topic} is not offered, only {sorted(self.channels)}"
-            self._text(self._socket.recv())
+            data = self._socket.recv()
+            self._text(data) if isinstance(data, str) else self._waiting.append(data)
         number = len(self._topics) + 1
         self._topics[number] = topic
         wanted = [{"id": number, "channelId": self.channels[topic]["id"]}]
@@ -57,7 +59,7 @@ class Viewer:
     def message(self):
         """Return the next message: topic, log time (ns), decoded by the schema that the server gave."""
         while True:
-            data = self._socket.recv()
+            data = self._waiting.pop(0) if self._waiting else self._socket.recv()
             if isinstance(data, str):
                 self._text(data)
                 continue
@@ -77,7 +79,7 @@ class Viewer:
         return decode
 
     def _text(self, data):
-        assert isinstance(data, str), "nothing was subscribed to yet"
+        assert data, "the server has closed the connection"
         said = json.loads(data)
         if said["op"] == "advertise":
             self.channels |= {channel["topic"]: channel for channel in said["channels"]}
