@@ -6,6 +6,7 @@ import contextlib
 import importlib.util
 import os
 import socket
+import sys
 from collections.abc import Iterator
 
 from robot_io.error_report import tell
@@ -18,7 +19,7 @@ PORT = 8765
 HOST = "127.0.0.1"
 READY_WITHIN_S = 5.0
 ENDS_WITHIN_S = 1.0
-EXTRA = "pip install 'single-point-push[live]', or in a checkout: .venv/bin/pip install foxglove-sdk"
+EXTRA = f"Install it: {sys.executable} -m pip install 'foxglove-sdk>=0.30'"
 
 
 def check_live(port: int, *, fast: bool = False) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from safety.faults import FAULTS
 from tools.watch.ball_force import BallForce, direction, drawing
 from tools.watch.seen import DEVICES, Link
 from tools.watch.view import ArmView, BaseView, Feed, View
 
-DRAWN_FROM = 64
+DRAWN_FROM = 70
 """The drawing stands beside the numbers from this many columns on."""
 DRAWING_ROWS = 7
+FROM_ABOVE = "from above, forward is up"
 NOTHING_YET = "no reading of the sensor yet"
 
 
@@ -27,9 +29,8 @@ def picture(view: View, columns: int, *, unicode: bool) -> list[Line]:
     lines = [Line(f"push watch {view.rig}: {view.source}", "title")]
     if view.stage is not None:
         stage = view.stage
-        lines.append(
-            Line(f"run: {stage.phase} {stage.mode}  {stage.progress_m:.2f} m  {' '.join(stage.faults)}".rstrip())
-        )
+        lines.append(Line(f"run: {stage.phase} {stage.mode}  {stage.progress_m:.2f} m"))
+        lines += [Line(f"{fault} {FAULTS[fault].text}", "bad") for fault in stage.faults if fault in FAULTS]
     lines += [Line(""), *_force(view, columns, unicode=unicode), Line("")]
     for device in DEVICES:
         lines += _wrapped(device, _facts(view, device), columns, _trouble(view, device))
@@ -73,6 +74,7 @@ def _force(view: View, columns: int, *, unicode: bool) -> list[Line]:
     ]
     if columns < DRAWN_FROM:
         return [sign, *map(Line, rows)]
+    sign = Line(f"{sign.text:<42}{FROM_ABOVE}", sign.style)
     shape = drawing(force.body, rows=DRAWING_ROWS, unicode=unicode)
     beside = [f"{row:<42}{drawn}".rstrip() for row, drawn in zip(rows, shape, strict=True)]
     return [sign, *map(Line, beside)]
@@ -158,7 +160,7 @@ def _wrapped(device: str, facts: list[str], columns: int, trouble: bool) -> list
     lines, text = list[str](), f"{device:<5}"
     for fact in facts:
         piece = fact if text.strip() in ("", device) else f"; {fact}"
-        if len(text) + len(piece) > columns and text.strip() not in ("", device):
+        if len(text) + len(piece) >= columns and text.strip() not in ("", device):
             lines.append(f"{text};")
             text, piece = " " * 5, fact
         while len(text) + len(piece) > columns:

@@ -19,10 +19,11 @@ from robot_io.messages import (
     SensorWrench,
     Stamped,
 )
+from safety.faults import FAULTS
 from tools.rig import resolve_rig
 from tools.watch.reports import DeviceReport
 from tools.watch.screen import one_line, picture
-from tools.watch.seen import Seen
+from tools.watch.seen import Seen, Stage
 from tools.watch.view import as_json, view_of
 
 NOW_NS = 100 * NS_PER_S
@@ -111,7 +112,7 @@ def test_the_json_has_one_schema_and_only_numbers_that_json_knows():
     assert told["run"] is None
 
 
-@pytest.mark.parametrize("columns", [20, 40, 63, 64, 80, 200])
+@pytest.mark.parametrize("columns", [20, 40, 69, 70, 80, 200])
 def test_no_line_is_wider_than_the_terminal(columns):
     lines = lines_of(a_seen_robot(), columns)
     assert max(map(len, lines)) <= columns
@@ -135,6 +136,15 @@ def test_a_lost_device_is_said_in_words_and_marked():
     assert line.text == "base LOST: ws://127.0.0.1:1: nothing listens. Start rosbridge"
     assert line.style == "bad"
     assert "LOST" in one_line(view_of(seen, "here", NOW_NS))
+
+
+def test_a_run_is_shown_with_its_faults_in_words():
+    seen = a_seen_robot()
+    seen.stage = Stage("PUSH", "SLOW", 0.31, ("F50-slow",))
+    text = "\n".join(lines_of(seen))
+    assert "run: PUSH SLOW  0.31 m" in text
+    assert f"F50-slow {FAULTS['F50-slow'].text}" in text
+    assert "t tares" not in text, "its tare is the run's"
 
 
 def test_a_sensor_that_was_away_is_tared_again():
