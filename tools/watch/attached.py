@@ -9,12 +9,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from mcap.records import Attachment
+from mcap.records import Attachment, Metadata
 
-from robot_io.errors import EnvironmentFault, PushError
+from robot_io.errors import EnvironmentFault, LogDamaged
 from robot_io.ipc.spawn import spawn
-from robot_io.log.log_format import LOG_FORMAT
-from robot_io.mcap.log_file import CONFIG_ATTACHMENT
+from robot_io.log.log_format import format_of
+from robot_io.mcap.log_file import CONFIG_ATTACHMENT, RUN_METADATA
 from robot_io.mcap.walk import walk
 from robot_io.rig.config import RigConfig
 from robot_io.rig.logged import rig_of_log
@@ -48,14 +48,16 @@ class AttachedRun:
         self.reports.close()
 
     def read(self) -> list[Report]:
-        """Return what came since the last call. Raises PushError when the log cannot be followed."""
+        """Return what came since the last call, at last how it ended. Raises PushError where that is unknown."""
         ended = self._child.process.poll() is not None  # looked at first: all that it said is there by then
         told = self.reports.read()
-        if ended and not any(isinstance(report, RunEnded) for report in told):
+        if ended:
             self._child.hear()
             if self._child.errors:
                 raise self._child.errors[0]
-            raise EnvironmentFault(f"the process that reads the log {self._child.how_it_ended()}")
+            if self._child.finished is None:
+                raise EnvironmentFault(f"the process that reads the log {self._child.how_it_ended()}")
+            told.append(RunEnded(self._child.finished["text"]))
         return told
 
 
@@ -64,10 +66,19 @@ def rig_of_run(run: RunningRun) -> RigConfig:
     log, until_s = Path(run.log), time.monotonic() + BEGUN_WITHIN_S
     while True:
         try:
-            for item in walk(log, grown=lambda _: log.stat().st_size):
-                if isinstance(item, Attachment) and item.name == CONFIG_ATTACHMENT:
-                    return rig_of_log(item.data.decode(), LOG_FORMAT, run.log).rig
-        except PushError:
+            return _rig_of(log)
+        except LogDamaged:
             if time.monotonic() > until_s:
                 raise
         time.sleep(POLL_S)  # the recorder has not flushed its first bytes yet
+
+
+def _rig_of(log: Path) -> RigConfig:
+    """Read the rig, which stands with its format at the beginning. Raises LogDamaged while that is not all there."""
+    config = ""
+    for item in walk(log, grown=lambda _: log.stat().st_size):
+        if isinstance(item, Attachment) and item.name == CONFIG_ATTACHMENT:
+            config = item.data.decode()
+        elif isinstance(item, Metadata) and item.name == RUN_METADATA:
+            return rig_of_log(config, format_of(item.metadata), str(log)).rig
+    raise LogDamaged("there is no config in it", where=str(log))

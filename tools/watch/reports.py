@@ -39,7 +39,7 @@ class RunReport(msgspec.Struct, frozen=True, tag=True):
 
 
 class RunEnded(msgspec.Struct, frozen=True, tag=True):
-    """The run's log grows no more: why, in words."""
+    """The run's log grows no more: why, in words. Comes from the process's status, which is never lost."""
 
     text: str
 

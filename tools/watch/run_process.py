@@ -29,7 +29,7 @@ from robot_io.tick import TICK_CDR, ControlTick, FtReading
 from tools.live.feed import LiveFeed
 from tools.log.derivation import TICK_TOPIC
 from tools.places.running import RunningRun
-from tools.watch.reports import ReportSender, RunEnded, RunReport
+from tools.watch.reports import ReportSender, RunReport
 
 POLL_S = 0.05
 NICENESS = 10
@@ -91,13 +91,14 @@ class RunFollower:
             self._live.add(topic, message.log_time, message.data)
 
     def _grown(self, wanted: int) -> int:
-        while True:
+        while (size := self._log.stat().st_size) < wanted:
             alive = self._run.alive()  # looked at before the size, which no longer changes once they have ended
             size = self._log.stat().st_size
             if size >= wanted or not alive:
-                return size
+                break
             self._report()
             time.sleep(POLL_S)
+        return size
 
     def _report(self) -> None:
         """Report what came since the last time, if there is anything."""
@@ -124,10 +125,11 @@ def main() -> int:
     os.nice(NICENESS)
     reports = ReportSender(socket.socket(fileno=job.report_fd))
     live = LiveFeed(socket.socket(fileno=job.live_fd)) if job.live_fd >= 0 else None
+    status = StatusPipe(job.status_fd)
     try:
-        reports.send(RunEnded(RunFollower(job.run, reports, live).follow()))
+        status.say("finished", text=RunFollower(job.run, reports, live).follow())
     except PushError as error:
-        StatusPipe(job.status_fd).error(error)
+        status.error(error)
         return error.exit_code
     return 0
 

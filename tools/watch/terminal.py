@@ -65,11 +65,16 @@ class Terminal:
 
     @staticmethod
     def is_there() -> bool:
-        """Return whether both stdin and stdout are a terminal that can be drawn on."""
+        """Return whether both stdin and stdout are a terminal that can be drawn on, and is not that of another job."""
         try:
-            return sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+            if not (sys.stdin.isatty() and sys.stdout.isatty()) or os.environ.get("TERM") == "dumb":
+                return False
         except (AttributeError, ValueError):  # closed
             return False
+        try:
+            return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+        except OSError:  # it controls no session, and has no jobs
+            return True
 
     def __enter__(self) -> Self:
         self._stdin = sys.stdin.fileno()

@@ -97,6 +97,18 @@ def test_a_device_that_is_not_there_is_said_beside_those_that_are(state):
         assert watch.wait().code == 0
 
 
+@pytest.mark.long
+def test_killed_it_leaves_no_process_and_no_stream_behind_and_meanwhile_no_run_starts(state):
+    with robot() as (sensor, _, _, settings), started(state, "watch", "emulated", "--json", *settings) as watch:
+        newest(watch, lambda shown: shown["ft"]["state"] == shown["arm"]["state"] == "up", "they are up")
+        error = one_error(finished(state, "run", "emulated", "--move-robot", "--json", *settings), 3)
+        assert "in use by another run" in error["what"]
+        watch.signal(signal.SIGKILL)
+        watch.process.wait()
+        watch.wait_gone(6.0)
+        assert not sensor.ask("counters")["streaming"]
+
+
 def test_where_there_is_no_terminal_it_prints_lines(state):
     with started(state, "watch", "emulated") as watch:
         wait_until(lambda: "holding" in watch.out and watch.out.count("\n") >= 3, "lines", 30.0)
