@@ -57,11 +57,11 @@ def one_line(view: View) -> str:
 def _force(view: View, columns: int, *, unicode: bool) -> list[Line]:
     force = view.force
     if force is None:
-        return [Line(view.tare or NOTHING_YET, "sign"), *[Line("")] * DRAWING_ROWS]
+        return [_bar(view.tare or NOTHING_YET, columns), *[Line("")] * DRAWING_ROWS]
     towards = direction(force.body)
     arrow = towards.arrow if unicode else towards.ascii_arrow
     axes = f"  ({towards.axes} BODY)" if towards.axes else ""
-    sign = Line(f"{arrow}  {_said(force)}{axes}", "sign")
+    sign = f"{arrow}  {_said(force)}{axes}"
     path = f"PATH   {_numbers(force.path)} N" if force.path is not None else "PATH   the heading is not known"
     rows = [
         f"on ball{'x':>8}{'y':>9}{'z':>9}",
@@ -73,11 +73,15 @@ def _force(view: View, columns: int, *, unicode: bool) -> list[Line]:
         view.tare,
     ]
     if columns < DRAWN_FROM:
-        return [sign, *map(Line, rows)]
-    sign = Line(f"{sign.text:<42}{FROM_ABOVE}", sign.style)
+        return [_bar(sign, columns), *map(Line, rows)]
     shape = drawing(force.body, rows=DRAWING_ROWS, unicode=unicode)
     beside = [f"{row:<42}{drawn}".rstrip() for row, drawn in zip(rows, shape, strict=True)]
-    return [sign, *map(Line, beside)]
+    return [_bar(f"{sign:<42}{FROM_ABOVE}", columns), *map(Line, beside)]
+
+
+def _bar(text: str, columns: int) -> Line:
+    """Return a line that is as wide as the screen; the last column stays free, or the terminal would wrap."""
+    return Line(f"{text:<{max(0, columns - 1)}}", "sign")
 
 
 def _said(force: BallForce) -> str:

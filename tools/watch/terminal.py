@@ -18,9 +18,9 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.
 """All of them end it. Suspended by Ctrl-Z it would keep the devices and show nothing."""
 COLUMNS, ROWS = 80, 24
 _ALTERNATE, _NORMAL = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
-_STYLES = {"title": "\x1b[1m", "sign": "\x1b[1;36m", "bad": "\x1b[1;31m", "faint": "\x1b[2m"}
-_PLAIN_STYLES = {"title": "\x1b[1m", "sign": "\x1b[1m", "bad": "\x1b[7m"}
-"""Without colour (NO_COLOR): bold and inverse."""
+_STYLES = {"title": "\x1b[1m", "sign": "\x1b[1;30;46m", "bad": "\x1b[1;31m", "faint": "\x1b[2m"}
+_PLAIN_STYLES = {"title": "\x1b[1m", "sign": "\x1b[1;7m", "bad": "\x1b[1;4m"}
+"""Without colour (NO_COLOR): bold, inverse and underlined."""
 
 
 class Signals:
