@@ -98,11 +98,7 @@ def run(args: argparse.Namespace) -> int:
         out = run_dir.create(args.out, rig.name)
         early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
         try:
-            if simulated:
-                with live_view(args.live_port if args.live else None) as to_view:
-                    summary = run_lockstep(args, rig, out, saved, to_view)
-            else:
-                summary = run_wall_clock(args, rig, out, saved)
+            summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
         except BaseException:
             if early is not None:
                 early.drop()
@@ -211,10 +207,16 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
     return with_injected(summary, launcher.injected(figures))
 
 
-def run_lockstep(
-    args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None, to_view: socket.socket | None = None
+def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+    """Run level sim, with its live view where one is wanted, and return its summary."""
+    with live_view(args.live_port if args.live else None) as to_view:
+        return lockstep_summary(args, rig, out, saved, to_view)
+
+
+def lockstep_summary(
+    args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None, to_view: socket.socket | None
 ) -> dict[str, Any]:
-    """Run level sim in this process and return its summary. to_view: of a live view."""
+    """Run level sim in this process and return its summary."""
     from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
     text = run_dir.write_config(out, rig)
