@@ -47,6 +47,11 @@ COMMANDS = {
         "look at every device, this machine and the rig; nothing moves",
         ("push doctor emulated", "push doctor my-rig.toml --json"),
     ),
+    "watch": Command(
+        "tools.commands.watch",
+        "force, arm and base, live; nothing moves",
+        ("push watch emulated", "push watch my-rig.toml --json"),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",
