@@ -98,4 +98,4 @@ def _results(runs: Sequence[ComparedRun], results: Sequence[Result]) -> str:
         colour = line_of(one).colour
         swatch = f'<i class="swatch" style="background:var(--c{colour[1:].lower()}, {colour})"></i>'
         text = text.replace(f"<tr><td>{one.number}</td>", f"<tr><td>{swatch}{one.number}</td>", 1)
-    return text
+    return f'<div class="results">{text}</div>'

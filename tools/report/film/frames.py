@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 SPEED = 4.0
 """Seconds of a run shown in a second of film."""
 FRAMES_PER_S = 10.0
-MOST_FRAMES = 900
+MOST_FRAMES = 600
 BEFORE_S = 1.0
 """How long before the first contact a film begins."""
 ARROW_M = 0.3
 """Length of the arrow for the greatest force of the run."""
 DPI = 100
-MOST_IN_LEGEND = 6
+MOST_IN_LEGEND, COLUMNS = 12, 3
+LEGEND_ROW_IN = 0.21
+LONGEST_M, WINDOW_M = 10.0, 8.0
+"""A longer path is shown through a window, which follows the run that is ahead."""
 
 Image = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
@@ -46,14 +49,20 @@ class Film:
         self.count = min(wanted, MOST_FRAMES)
         self.frames_per_s = FRAMES_PER_S * self.count / wanted
         self._times = np.linspace(-BEFORE_S, length_s - BEFORE_S, self.count)
+        named = self._actors[:MOST_IN_LEGEND] if len(self._actors) > 1 else []
         with style():
-            self._figure, axes = plan_axes([actor.place for actor in self._actors], 0.5)
+            legend_in = 0.15 + LEGEND_ROW_IN * math.ceil(len(named) / COLUMNS)
+            self._figure, self._axes = plan_axes([actor.place for actor in self._actors], legend_in)
             self._figure.set_dpi(DPI)
-            self._draw_floor(axes)
+            self._draw_floor(named)
             for actor in self._actors:
-                actor.enter(axes)
-            self._clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")
-            self._axes = axes
+                actor.enter(self._axes)
+            at: dict[str, Any] = {"transform": self._axes.transAxes, "va": "top", "animated": True}
+            self._clock = self._axes.text(0.01, 0.97, "", **at)
+        begin, end = self._axes.get_xlim()
+        self._follows = end - begin > LONGEST_M
+        if self._follows:
+            self._zoom(WINDOW_M / (end - begin))
         width, height = self._canvas.get_width_height()
         self.width, self.height = width - width % 2, height - height % 2
 
@@ -62,26 +71,37 @@ class Film:
         with style():
             self._canvas.draw()
             floor = self._canvas.copy_from_bbox(self._figure.bbox)
-            for time_s in self._times:
-                self._canvas.restore_region(floor)
+            for time_s in map(float, self._times):
+                moved = [artist for actor in self._actors for artist in actor.at(time_s)]
+                if self._follows:
+                    ahead_m = max(actor.along_m for actor in self._actors)
+                    self._axes.set_xlim(ahead_m - 0.6 * WINDOW_M, ahead_m + 0.4 * WINDOW_M)
+                    self._canvas.draw()
+                else:
+                    self._canvas.restore_region(floor)
                 self._clock.set_text(f"{max(time_s, 0.0):.1f} s")
-                for artist in (*(a for actor in self._actors for a in actor.at(float(time_s))), self._clock):
+                for artist in (*moved, self._clock):
                     self._axes.draw_artist(artist)
                 yield np.asarray(self._canvas.buffer_rgba())[: self.height, : self.width, :3].copy()
+
+    def _zoom(self, share: float) -> None:
+        """Show less of the path, at the same scale in both directions and around y = 0."""
+        low, high = self._axes.get_ylim()
+        self._axes.set_ylim(-(high - low) / 2 * share, (high - low) / 2 * share)
 
     @property
     def _canvas(self) -> Any:
         return self._figure.canvas
 
-    def _draw_floor(self, axes: Axes) -> None:
+    def _draw_floor(self, named: Sequence[_Actor]) -> None:
         corridor_m = max(actor.place.run.rig.goal.corridor_m for actor in self._actors)
-        axes.axhspan(-corridor_m, corridor_m, color=CORRIDOR, linewidth=0, zorder=0)
-        axes.axhline(0.0, color=INK, linestyle=(0, (5, 4)), linewidth=1.0)
-        named = self._actors[:MOST_IN_LEGEND] if len(self._actors) > 1 else []
+        self._axes.axhspan(-corridor_m, corridor_m, color=CORRIDOR, linewidth=0, zorder=0)
+        self._axes.axhline(0.0, color=INK, linestyle=(0, (5, 4)), linewidth=1.0)
         for actor in named:
-            axes.plot([], [], color=actor.line.colour, linestyle=actor.line.dashes, label=plain(actor.name, 30))
+            label, line = plain(actor.name, 30), actor.line
+            self._axes.plot([], [], color=line.colour, linestyle=line.dashes, label=label)
         if named:
-            self._figure.legend(loc="upper center", ncols=3, frameon=False)
+            self._figure.legend(loc="upper center", ncols=COLUMNS, frameon=False)
 
 
 class _Actor:
@@ -94,6 +114,7 @@ class _Actor:
         self._begin_s = float(ticks["t_s"][pushed[0]]) if len(pushed) else 0.0
         self._times = ticks["t_s"] - self._begin_s
         self.length_s = float(self._times[-1])
+        self.along_m = 0.0
         force = np.hypot(ticks["force_x"], ticks["force_y"])
         self._arrow_m_per_N = ARROW_M / float(np.nanmax(force, initial=1.0))
         self._outline = outline(one.run)
@@ -114,6 +135,8 @@ class _Actor:
     def at(self, time_s: float) -> list[Any]:
         """Move everything to a time (s since first contact); return what is to be drawn, from the bottom up."""
         tick = min(int(np.searchsorted(self._times, time_s)), len(self._times) - 1)
+        if math.isfinite(self.place.x[tick]):
+            self.along_m = float(self.place.x[tick])
         x, y = self.place.x, self.place.y
         step = max(1, tick // 1000)
         self._trail.set_data(x[: tick + 1 : step], y[: tick + 1 : step])

@@ -13,7 +13,7 @@ from tools.report.compare.given_runs import ComparedRun
 from tools.report.film.frames import Film
 
 MOST_BYTES = 10_000_000
-COLOURS = 64
+COLOURS = 255
 
 
 def write_gif(runs: Sequence[ComparedRun], out: Path) -> None:
