@@ -12,12 +12,15 @@ from tools.report.run_verdict import Verdict
 from tools.terminal.gain_warning import gain_warning
 from tools.verdict.evidence import LINE
 
+FRAME = "push calibrate frame"
+BIAS = "push calibrate bias"
+LONG_TARE_S = 5.0
+"""A tare this long is no longer what limits a push."""
 BY_EVIDENCE = {
     "contact_lost_m": "Contact was lost too long: start the push nearer to the middle of the object.",
     "contact_lost_times": "Contact was lost too often: lower `control.force_min_N` for a light object.",
     "early_contact": "Something was touched before the object: clear the way, or correct `path.expected_contact_m`.",
-    "force_before_contact": "The sensor did not read zero before contact: let it warm up, and tare again "
-    "(`push calibrate bias`).",
+    "force_before_contact": f"The sensor did not read zero before contact: let it warm up, and tare again (`{BIAS}`).",
     "residual": "The sensor does not read zero after the push: look whether something pulls at its cable or tool, and "
     "tare for longer (`ft.tare_s`).",
     "log": "The log is not complete: `push log info` says what is missing.",
@@ -75,8 +78,8 @@ def _next_step(run: RunData, angle: ForceAngle, per_newton_m: float) -> str:
         f"explains at most {start:.1f}, the tare {tare:.1f}"
     )
     if angle.points_at_the_frame:
-        return f"{found}: the sensor's mounting is off, and `push calibrate frame` measures it."
-    if start > tare:
+        return f"{found}: the sensor's mounting is off, and `{FRAME}` measures it."
+    if run.rig.ft.tare_s >= LONG_TARE_S or start > 2 * tare:
         return f"{found}: push further before anything is concluded from it."
     tare_N = tare_error_newtons(run.rig)
     return (

@@ -36,8 +36,7 @@ def logs_of(named: Sequence[Path]) -> list[Path]:
     """
     logs: list[Path] = []
     for path in named:
-        trials = sorted(path.glob(f"{TRIALS}/run.mcap")) if path.is_dir() and not (path / "run.mcap").exists() else []
-        logs += trials or [find_log(path)]
+        logs += _trials(path) or [find_log(path)]
     if len(logs) > MOST_RUNS:
         raise UsageError(f"{len(logs)} runs are too many for one page", do=f"Give at most {MOST_RUNS}")
     return logs
@@ -74,6 +73,14 @@ def path_notes(runs: Sequence[ComparedRun]) -> list[str]:
     if unseen:
         notes.append(f"The object was not seen in {', '.join(unseen)}: the contact point is drawn instead.")
     return notes
+
+
+def _trials(folder: Path) -> list[Path]:
+    """Return the logs of a folder of trials; empty for anything else, also for what cannot be read."""
+    try:
+        return [] if (folder / "run.mcap").exists() else sorted(folder.glob(f"{TRIALS}/run.mcap"))
+    except OSError:
+        return []
 
 
 def _mark(run: RunData) -> str:
