@@ -71,6 +71,10 @@ class Page:
         features = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self._ask("Emulation.setEmulatedMedia", media="print" if printed else "screen", features=features)
 
+    def scripts(self, *, allowed: bool) -> None:
+        """Choose whether scripts of pages run."""
+        self._ask("Emulation.setScriptExecutionDisabled", value=not allowed)
+
     def value(self, expression: str) -> Any:
         """Return the value of a JavaScript expression on the page."""
         answer = self._ask("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)

@@ -13,6 +13,8 @@ from tools.terminal.arguments import named_path
 if TYPE_CHECKING:
     from tools.report.compare.given_runs import ComparedRun
 
+FILMS = ("film.gif", "film.mp4")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push report`."""
@@ -64,6 +66,9 @@ def write_page(log: Path, args: argparse.Namespace) -> list[Path]:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise EnvironmentFault(f"the report cannot be written: {error.strerror}", where=str(out)) from None
+    kept = [out / name for name in FILMS if (out / name).exists() and not (out / "report.html").exists()]
+    if kept and (args.gif or args.mp4):
+        raise UsageError("there is already a file of this name", where=str(kept[0]), do="Give another --out")
     written = write_report(log, out / "report.html", png=args.png)
     return [*written, *(films(read_runs([log]), out, args) if args.gif or args.mp4 else [])]
 
@@ -86,7 +91,7 @@ def films(runs: list[ComparedRun], out: Path, args: argparse.Namespace) -> list[
     from tools.report.film.mp4 import write_mp4
 
     written = []
-    for wanted, name, write in ((args.gif, "film.gif", write_gif), (args.mp4, "film.mp4", write_mp4)):
+    for wanted, name, write in zip((args.gif, args.mp4), FILMS, (write_gif, write_mp4), strict=True):
         if wanted:
             write(runs, out / name)
             written.append(out / name)

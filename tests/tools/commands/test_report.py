@@ -33,6 +33,7 @@ from tools.report import process as report_process
 from tools.report.page import page, run_mark, write_report
 from tools.report.process import ReportProcess
 from tools.report.run_data import read_run
+from tools.report.run_facts import law_name, reader_facts
 from tools.report.run_summary import baseline_of, differences, tiles
 from tools.report.run_verdict import verdict
 
@@ -223,6 +224,36 @@ def test_a_summary_that_is_none_changes_nothing(ran, ticks, tmp_path, beside):
 
     text = page(read_run(log), read_summary_file(tmp_path / "summary.json"), {}, "0")
     assert "<h3>ft300</h3>" in text
+
+
+def test_a_law_is_called_by_its_own_name(ran):
+    run = read_run(ran[0] / "run.mcap")
+    for law, name in (
+        ("force", "force feedback"),
+        ("open-loop", "open loop, straight ahead"),
+        ("mine:Law", "mine:Law"),
+    ):
+        rig = replace(run.rig, control=replace(run.rig.control, controller=law))
+        assert law_name(rig) == name
+
+
+def test_facts_begin_with_what_a_reader_asks(ran):
+    run = read_run(ran[0] / "run.mcap")
+    rows = reader_facts(run, {"note": "box, 2 kg"})
+    assert [name for name, _ in rows][:3] == ["note", "rig", "law"]  # a virtual clock has no date
+    assert dict(rows)["law"] == "force feedback, k_f 0.3, k_y 0.2 rad/m"
+    assert dict(rows)["push"] == "0.2 m at 0.1 m/s"
+    text = (ran[0] / "report.html").read_text()
+    assert text.index("force feedback, k_f 0.3") < text.index("message_sum")
+    assert "<details>" in text[: text.index("message_sum")]
+
+
+@pytest.mark.long
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize(("distance_m", "most_bytes"), [(6, 1_500_000), (60, 4_000_000)])
+def test_a_page_is_small(tmp_path, distance_m, most_bytes):
+    assert main(["run", "sim", "--fast", "--distance-m", str(distance_m), "--out", str(tmp_path / "run")]) == 0
+    assert (tmp_path / "run" / "report.html").stat().st_size <= most_bytes
 
 
 def test_a_log_without_a_tick(ran, tmp_path):

@@ -6,8 +6,9 @@ import shutil
 import xml.etree.ElementTree as ET
 
 import pytest
+from msgspec.structs import replace
 
-from tests.tools.commands.test_report import Page
+from tests.tools.commands.test_report import EVIL, Page, hardware, rig_of, write_log
 from tools.cli import main
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -116,6 +117,20 @@ def test_runs_of_different_paths_are_said_to_be(runs, tmp_path, capsys):
     words = "These runs were pushed along different paths; each is drawn in the frame of its own path."
     assert words in capsys.readouterr().err
     assert words in (tmp_path / "out" / "compare.html").read_text()
+
+
+def test_logs_without_a_push_and_with_hostile_names_are_shown_too(runs, tmp_path):
+    rig = rig_of(runs / "one")
+    logs = [
+        write_log(tmp_path / "a.mcap", hardware(rig, name=EVIL), [], note=EVIL),
+        write_log(tmp_path / "b.mcap", replace(rig, name="</svg>"), [], level="sim"),
+    ]
+    assert main(["report", *map(str, logs), str(runs / "one"), "--out", str(tmp_path / "out")]) == 0
+    text = (tmp_path / "out" / "compare.html").read_text()
+    assert "<script" not in text
+    assert "&lt;/svg&gt;" in text
+    assert "did not start" in text
+    ET.fromstring((tmp_path / "out" / "compare.svg").read_text())
 
 
 def test_nothing_is_overwritten(compared, runs, capsys):

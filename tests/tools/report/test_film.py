@@ -55,3 +55,10 @@ def test_without_ffmpeg_it_is_named_before_anything_is_written(runs, tmp_path, m
     error = json.loads(capsys.readouterr().out)["error"]
     assert "ffmpeg" in error["what"]
     assert not (tmp_path / "out").exists()
+
+
+def test_a_film_of_somebody_else_is_kept(runs, tmp_path, capsys):
+    (tmp_path / "film.gif").write_text("mine")
+    assert main(["report", str(runs / "one"), "--gif", "--out", str(tmp_path), "--json"]) == 2
+    assert (tmp_path / "film.gif").read_text() == "mine"
+    assert [path.name for path in tmp_path.iterdir()] == ["film.gif"]

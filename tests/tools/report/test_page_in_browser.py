@@ -126,6 +126,15 @@ def test_a_script_that_is_not_ours_does_not_run(page, report, tmp_path):
     page.problems.clear()
 
 
+def test_without_scripts_all_figures_are_there_and_the_player_is_not(page, report):
+    page.scripts(allowed=False)
+    page.open(report)
+    page.scripts(allowed=True)
+    assert page.value("getComputedStyle(document.getElementById('player')).display") == "none"
+    assert page.value("document.querySelectorAll('figure svg').length") == 6
+    assert page.value("document.querySelectorAll('line.cursor').length") == 0
+
+
 def test_a_comparison_opens_on_desktop_and_phone(page, runs, tmp_path):
     assert main(["report", *(str(runs / name) for name in ("one", "two", "open")), "--out", str(tmp_path / "out")]) == 0
     for width in (1280, 390):
