@@ -53,7 +53,7 @@ def test_the_legend_says_what_differs(compared):
     root = ET.fromstring((compared / "compare.svg").read_text())
     texts = [element.text or "" for element in root.iter(f"{SVG}text")]
     assert [text for text in texts if text[:2] in ("1:", "2:", "3:")] == [
-        "1: law force, seed 1", "2: law force, seed 2", "3: law open-loop, seed 1",
+        "1: force feedback, seed 1", "2: force feedback, seed 2", "3: open loop, seed 1",
     ]  # fmt: skip
 
 
@@ -73,7 +73,7 @@ def test_the_table_says_what_the_runs_said(compared, runs):
 
 def test_the_picture_says_in_words_what_it_shows(compared, runs):
     alt = Page((compared / "compare.html").read_text()).pictures["compare"]
-    assert f"run 1 (law force, seed 1): done after {told(runs, 'one')['distance_m']:.2f} m" in alt
+    assert f"run 1 (force feedback, seed 1): done after {told(runs, 'one')['distance_m']:.2f} m" in alt
 
 
 def test_a_folder_of_trials_stands_for_its_runs(runs, tmp_path):

@@ -13,7 +13,7 @@ from tools.report.run_data import RunData, read_run
 from tools.report.run_facts import note_of
 from tools.report.run_verdict import Verdict, verdict
 
-MOST_RUNS = 200
+MOST_RUNS = 100
 TRIALS = "trial-*"
 
 

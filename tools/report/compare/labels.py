@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from tools.report.run_data import RunData
+from tools.report.run_facts import LAWS
 from tools.report.run_summary import flat_settings
 
 MOST_WORDS = 3
@@ -31,7 +32,7 @@ def labels(runs: Sequence[RunData]) -> list[str]:
     differing = differing_settings(runs)
     if "name" in differing:
         differing = {name: found for name, found in differing.items() if not name.startswith(OF_THE_RIG)}
-    words = [[f"{_short(name)} {found[i]}" for name, found in differing.items()] for i in range(len(runs))]
+    words = [[_words(name, found[i]) for name, found in differing.items()] for i in range(len(runs))]
     names = [", ".join(one[:MOST_WORDS]) for one in words]
     if len(set(names)) == len(names):
         return names
@@ -51,10 +52,11 @@ def _rank(name: str) -> tuple[int, str]:
     return (3 if name == "name" else 4 if name.startswith("control.") else 6 if name == "seed" else 5), name
 
 
-def _short(name: str) -> str:
-    return {"name": "rig", "control.controller": "law", "control.k_y_rad_per_m": "k_y"}.get(
-        name, name.rpartition(".")[2]
-    )
+def _words(name: str, value: str) -> str:
+    if name == "control.controller":
+        return LAWS.get(value, f"law {value}").partition(",")[0]
+    short = {"name": "rig", "control.k_y_rad_per_m": "k_y"}.get(name, name.rpartition(".")[2])
+    return f"{short} {value}"
 
 
 def _folders(runs: Sequence[RunData]) -> list[str]:

@@ -71,6 +71,10 @@ class RunInPlan:
         pushed = pushed[np.isfinite(self.x[pushed]) & np.isfinite(self.y[pushed])]
         if not len(pushed):
             return []
+        # Twice a second: from tick to tick the noise of the pose would add up to more than the way.
+        times = self.run.ticks["t_s"][pushed]
+        seldom = np.searchsorted(times, np.arange(times[0], times[-1], 0.5))
+        pushed = pushed[np.unique([*seldom.tolist(), len(pushed) - 1])]
         way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(self.x[pushed]), np.diff(self.y[pushed])))))
         every = max(OUTLINE_EVERY_M, float(way[-1]) / MOST_OUTLINES)
         # The last mark shows the end; one just before it would only be covered.

@@ -13,7 +13,9 @@ from tools.report.compare.given_runs import ComparedRun
 from tools.report.film.frames import Film
 
 MOST_BYTES = 10_000_000
-COLOURS = 255
+COLOURS = 128
+LAST_MS = 2000
+"""How long the last frame stays before the film begins again."""
 
 
 def write_gif(runs: Sequence[ComparedRun], out: Path) -> None:
@@ -35,7 +37,6 @@ def write_gif(runs: Sequence[ComparedRun], out: Path) -> None:
 
 def _encoded(frames: Sequence[Any], per_frame_ms: float) -> bytes:
     target = io.BytesIO()
-    frames[0].save(
-        target, format="GIF", save_all=True, append_images=frames[1:], duration=round(per_frame_ms / 10) * 10, loop=0
-    )
+    times_ms = [*[round(per_frame_ms / 10) * 10] * (len(frames) - 1), LAST_MS]
+    frames[0].save(target, format="GIF", save_all=True, append_images=frames[1:], duration=times_ms, loop=0)
     return target.getvalue()
