@@ -59,8 +59,8 @@ COMMANDS = {
     ),
     "report": Command(
         "tools.commands.report",
-        "figures and one self-contained page of a log",
-        ("push report runs/demo/run.mcap", "push report runs/demo/run.mcap --json"),
+        "the page of a run, or one page that compares several",
+        ("push report runs/demo --png", "push report runs/one runs/two --out runs/compared --gif"),
     ),
     "view": Command(
         "tools.commands.view",
