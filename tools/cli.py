@@ -47,6 +47,11 @@ COMMANDS = {
         "look at every device, this machine and the rig; nothing moves",
         ("push doctor emulated", "push doctor my-rig.toml --json"),
     ),
+    "watch": Command(
+        "tools.commands.watch",
+        "force, arm and base, live; nothing moves",
+        ("push watch emulated", "push watch my-rig.toml --json"),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",
@@ -54,8 +59,8 @@ COMMANDS = {
     ),
     "report": Command(
         "tools.commands.report",
-        "figures and one self-contained page of a log",
-        ("push report runs/demo/run.mcap", "push report runs/demo/run.mcap --json"),
+        "the page of a run, or one page that compares several",
+        ("push report runs/demo --png", "push report runs/one runs/two --out runs/compared --gif"),
     ),
     "view": Command(
         "tools.commands.view",
