@@ -137,10 +137,11 @@ class RidgebackLook:
         nearest = min(range(len(times)), key=lambda i: times[i])
         return RoundTrip(sorted(times)[len(times) // 2], max(times), offsets[nearest], "rosapi")
 
-    def listen(self, least_s: float, most_s: float) -> Heard:
+    def listen(self, least_s: float, most_s: float, until: Callable[[], bool] = lambda: True) -> Heard:
         """Subscribe to everything, also to the command topic; return what comes.
 
-        Ends after `least_s` when every topic that is needed has spoken, at the latest after `most_s`.
+        Ends after `least_s` when every topic that is needed has spoken and `until` (called ten times a second and more)
+        is true, at the latest after `most_s`.
         """
         intake = Intake(self._reader, self._clock)
         samples: list[Stamped[BaseFeed]] = []
@@ -149,7 +150,8 @@ class RidgebackLook:
             for topic, type_name in {**self.feeds, self.command: self._command_type}.items():
                 self._link.send_text(encode_subscribe(topic, type_name))
             while (now_ns := self._clock()) - began_ns < most_s * NS_PER_S:
-                if now_ns - began_ns > least_s * NS_PER_S and not self._reader.silent_topics():
+                over = until() and now_ns - began_ns > least_s * NS_PER_S
+                if over and not self._reader.silent_topics():
                     break
                 self._link.wait_readable(now_ns + NS_PER_S // 10)
                 samples += intake.take(self._link)
