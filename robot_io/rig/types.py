@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from types import NoneType
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 from msgspec import Meta
@@ -32,3 +33,10 @@ Options = dict[str, _Plain | list[_Plain]]
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of a rig file: frozen, unknown keys refused."""
+
+
+def table_of(kind: Any) -> type[msgspec.Struct] | None:
+    """Return the table that a field of this type holds, also one that may be left out; None for any other field."""
+    present = [part for part in get_args(kind) if part is not NoneType] or [kind]
+    only = present[0] if len(present) == 1 else None
+    return only if isinstance(only, type) and issubclass(only, msgspec.Struct) else None
