@@ -26,6 +26,8 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
     base_rate_error: float = 0.0001
     base_from_marker: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """x (m), y (m), yaw (rad) of the marker frame in the BODY frame."""
+    ball_in_base_m: tuple[float, float] = (1.0, 0.0)
+    """Where the contact ball is in the BODY frame: motion capture sees a marker on it, where `ball_pose` names one."""
     battery_v: float = 26.2
     mocap_noise_m: float = 0.0
     """1 sigma, as the two below."""
@@ -57,6 +59,7 @@ def ridgeback_settings(rig: RigConfig, seed: int) -> RidgebackSettings:
         base_phase=rig.world.base_phase,
         base_rate_error=rig.world.base_tick_rate_error,
         base_from_marker=rig.frames.base_from_marker,
+        ball_in_base_m=rig.frames.contact_in_base_m[:2],
         mocap_noise_m=rig.world.mocap_noise_m,
         mocap_noise_rad=math.radians(rig.world.mocap_noise_deg),
         odometry_noise_m_per_s=rig.world.odometry_noise_m_per_s,
