@@ -37,9 +37,9 @@ class CannotCalibrate(DeviceNotReady):
 
 
 def rows_of(matrix: Array) -> Matrix3:
-    """Return a 3x3 rotation as the rig writes it, exactly orthonormal to rounding."""
+    """Return a 3x3 rotation as the rig writes it: orthonormal to the nine digits that are kept."""
     u, _, v = np.linalg.svd(matrix)
-    a, b, c = (u @ v).tolist()
+    a, b, c = (np.round(u @ v, 9) + 0.0).tolist()  # + 0.0: no minus before a zero
     return (tuple(a), tuple(b), tuple(c))
 
 
