@@ -123,6 +123,8 @@ def _choices(kind: Any) -> tuple[Any, ...]:
 
 
 def _finite(value: Any) -> bool:
+    if isinstance(value, msgspec.Struct):
+        value = msgspec.structs.astuple(value)
     if isinstance(value, tuple):
         return all(_finite(item) for item in value)
     return not isinstance(value, float) or math.isfinite(value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import NoneType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 from msgspec import Meta
@@ -15,6 +15,7 @@ NonNegative = Annotated[float, Meta(ge=0)]
 Level = Literal["sim", "emulated", "hardware"]
 Vector2 = tuple[float, float]
 _OnRobot = Annotated[float, Meta(ge=-5, le=5)]
+OnRobot2 = tuple[_OnRobot, _OnRobot]
 InBase = tuple[_OnRobot, _OnRobot, _OnRobot]
 """A point of the robot in m: beyond 5 m it was written in mm."""
 _InRoom = Annotated[float, Meta(ge=-1000, le=1000)]
@@ -33,6 +34,12 @@ Options = dict[str, _Plain | list[_Plain]]
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of a rig file: frozen, unknown keys refused."""
+
+
+def row_of(kind: Any) -> type[msgspec.Struct] | None:
+    """Return the table of which a field of this type holds a list; None for any other field."""
+    parts = get_args(kind)
+    return table_of(parts[0]) if get_origin(kind) is tuple and parts[1:] == (Ellipsis,) else None
 
 
 def table_of(kind: Any) -> type[msgspec.Struct] | None:

@@ -17,6 +17,7 @@ from sim_backend.ridgeback.noise import FeedNoise
 from sim_backend.ridgeback.ros_graph import Message, RosGraph
 from sim_backend.ridgeback.settings import RidgebackSettings
 from sim_backend.world.plant import BaseSource
+from sim_backend.world.truth import point_of
 
 
 class MotionCapture:
@@ -63,7 +64,7 @@ class MotionCapture:
         if t_ns >= self.base_hidden_until_ns:
             messages += self._base(t_ns)
         if t_ns >= self.slider_hidden_until_ns and self._graph.wanted(settings.slider_topic):
-            slider = self._slider_noise.pose(self._source.read_slider(t_ns))
+            slider = point_of(self._slider_noise.pose(self._source.read_slider(t_ns)), settings.slider_offset_m)
             messages.append((settings.slider_topic, self._writer.transform(settings.slider_topic, slider, t_ns)))
         if settings.topics.ball_pose and self._graph.wanted(settings.topics.ball_pose):
             messages.append(self._ball(t_ns))

@@ -22,11 +22,12 @@ from typing import Any
 import msgspec
 
 from robot_io.errors import EnvironmentFault
-from robot_io.geometry import point_outside
+from robot_io.geometry import base_pose_from_marker, compose, point_outside
 from robot_io.ipc.process import fresh_interpreter
 from robot_io.messages import BodyTwist, Pose2D, Vector3
 from robot_io.ridgeback import Ridgeback
 from robot_io.rig.config import RigConfig
+from sim_backend.world.truth import true_frames
 from tools.calibrate.people import Act, Done, Drive, PoseArm, Press
 from tools.rig import devices_at, with_addresses
 
@@ -124,12 +125,12 @@ def emulators(
 
 
 class Rehearsed:
-    """The rehearsed person. `true_contact_m`: where the ball really is in BODY; `seed` of how far off it is."""
+    """The rehearsed person, who sees where things really are; `seed` of how far off its hands are."""
 
-    def __init__(self, rig: RigConfig, served: Emulators, true_contact_m: Vector3, seed: int) -> None:
+    def __init__(self, rig: RigConfig, served: Emulators, seed: int) -> None:
         self._rig = rig
         self._served = served
-        self._contact = true_contact_m
+        self._true = true_frames(rig)
         self._dice = random.Random(f"hand-{seed}")
         self._free_s = 0.0
 
@@ -150,7 +151,9 @@ class Rehearsed:
 
     def plumb(self, text: str, base: Pose2D) -> tuple[float, float]:
         """See `Operator.plumb`: where the ball really is, read from a tape."""
-        x, y = point_outside(base.x, base.y, base.yaw, *self._contact[:2])
+        markers = compose(base, Pose2D(*self._rig.frames.base_from_marker))
+        true = base_pose_from_marker(markers, Pose2D(*self._true.base_from_marker))
+        x, y = point_outside(true.x, true.y, true.yaw, *self._true.contact_in_base_m[:2])
         x, y = (round(value + self._dice.gauss(0.0, PLUMB_M), 4) for value in (x, y))
         print(f"{text} (rehearsed): {x},{y}", file=sys.stderr, flush=True)
         return x, y

@@ -38,9 +38,8 @@ def open_session(
     person = Terminal() if rehearsal is None else None
     with DeviceLocks(rig), contextlib.ExitStack() as opened:
         if devices_at(rig, "emulated"):
-            contact = rig.frames.contact_in_base_m
             rig, served = opened.enter_context(emulators(rig, rig_name, overrides, rehearsal or 0))
-            yield Session(rig, folder_of(rig_name), person or Rehearsed(rig, served, contact, rehearsal or 0))
+            yield Session(rig, folder_of(rig_name), person or Rehearsed(rig, served, rehearsal or 0))
         else:
             assert person is not None
             yield Session(rig, folder_of(rig_name), person)

@@ -18,7 +18,7 @@ from robot_io.rig import calibration, config, task, topics, world
 from robot_io.rig.config import RigConfig
 from robot_io.rig.notes import notes_of
 from robot_io.rig.renames import RENAMED, RETIRED, advice
-from robot_io.rig.types import table_of
+from robot_io.rig.types import row_of, table_of
 
 INTRO = """# Rig files
 
@@ -70,7 +70,7 @@ def reference() -> str:
         parts.append("| key | type and range | default | |\n|---|---|---|---|")
         hints = get_type_hints(table, include_extras=True)
         for field in msgspec.structs.fields(table):
-            if table_of(hints[field.name]):
+            if table_of(hints[field.name]) or row_of(hints[field.name]):
                 continue
             note = notes.get((table.__name__, field.name), "").replace("\n", " ").replace("|", "\\|")
             parts.append(f"| `{field.name}` | {_type_text(hints[field.name])} | {_default(field)} | {note} |")
@@ -89,6 +89,8 @@ def _tables(table: type[msgspec.Struct], prefix: str) -> list[tuple[str, type[ms
             found[-1] = (f"{found[-1][0]}], [{name}", below)
         elif below and field.name != "declared":  # written by the program
             found += _tables(below, name)
+        if row := row_of(hints[field.name]):
+            found.append((f"[{name}]", row))
     return found
 
 

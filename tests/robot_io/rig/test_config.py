@@ -12,7 +12,7 @@ from robot_io.errors import ConfigError, UsageError
 from robot_io.rig import toml as toml_text
 from robot_io.rig.config import ControlConfig, RigConfig, load_rig, rig_from_toml, rig_to_toml
 from robot_io.rig.files import shipped_rigs
-from robot_io.rig.types import table_of
+from robot_io.rig.types import row_of, table_of
 
 DIMENSIONLESS = {
     "ros_version": "a version number",
@@ -31,6 +31,7 @@ DIMENSIONLESS = {
     "patch_strength": "a part of the mean",
     "base_from_sensor": "a rotation matrix",
     "base_from_marker": "m, m, rad: in the docstring",
+    "marker_offset": "m, m, rad: in the docstring",
     "bias": "N and N*m: in the docstring",
     "range": "N and N*m: in the docstring",
     "resolution": "N and N*m: in the docstring",
@@ -52,7 +53,7 @@ def write(path: Path, text: str) -> Path:
 
 def numeric_keys(kind: type[msgspec.Struct]):
     for field in msgspec.structs.fields(kind):
-        if table := table_of(field.type):
+        if table := table_of(field.type) or row_of(field.type):
             yield from numeric_keys(table)
         elif re.search(r"\b(float|int)\b|Literal\[\d", str(field.type)):
             yield field.name
