@@ -64,7 +64,6 @@ def ridgeback_settings(rig: RigConfig, seed: int) -> RidgebackSettings:
         mocap_rate_hz=rig.world.mocap_rate_hz,
         base_phase=rig.world.base_phase,
         base_rate_error=rig.world.base_tick_rate_error,
-        base_from_marker=rig.frames.base_from_marker,
         ball_in_base_m=true_frames(rig).contact_in_base_m[:2],
         base_from_marker=true_frames(rig).base_from_marker,
         marker_error=marker_error(rig),

@@ -20,7 +20,7 @@ from tools.places import saved_tare
 TARE_S = 5.0
 HOLD_S = 3.0
 WEIGH_S = 10.0
-SPARE_S = 2.0
+SPARE_S = 1.5
 """A press is held this much longer than it is measured."""
 PRESS_N = 15.0
 PULL_N = 25.0

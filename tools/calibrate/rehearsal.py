@@ -106,6 +106,8 @@ class Emulators:
             *lines, rest = (rest + more).split(b"\n")
             for line in lines:
                 told = msgspec.json.decode(line)
+                if "error" in told:
+                    raise EnvironmentFault(told["error"]["what"], where=told["error"]["where"], do=told["error"]["do"])
                 device, key = _KEYS[told["device"]]
                 found[device] = told[key]
         return found
@@ -140,14 +142,24 @@ class Rehearsed:
         if isinstance(act, Drive):
             return _Joystick(self._rig, act)
         if isinstance(act, Press):
-            force = self._aimed(act.force_body_N)
-            self._served.say({"hand": {"force_body_N": force, "for_s": act.for_s}})
-            self._free_s = time.monotonic() + act.for_s + FELT_AFTER_S
-            return _after(FELT_AFTER_S)
+            return self._pressing(act)
         if isinstance(act, PoseArm):
             self._served.say({"arm_rad": act.joints, "in_s": ARM_MOVES_S})
             return _after(ARM_MOVES_S + FELT_AFTER_S)
         return _after(max(0.0, self._free_s - time.monotonic()))
+
+    def _pressing(self, act: Press) -> Done:
+        """Press as soon as the hand is free: two presses at a time would add up."""
+        force, free_s, felt = self._aimed(act.force_body_N), self._free_s, list[Done]()
+
+        def done() -> bool:
+            if not felt and time.monotonic() >= free_s:
+                self._served.say({"hand": {"force_body_N": force, "for_s": act.for_s}})
+                self._free_s = time.monotonic() + act.for_s + FELT_AFTER_S
+                felt.append(_after(FELT_AFTER_S))
+            return bool(felt) and felt[0]()
+
+        return done
 
     def plumb(self, text: str, base: Pose2D) -> tuple[float, float]:
         """See `Operator.plumb`: where the ball really is, read from a tape."""

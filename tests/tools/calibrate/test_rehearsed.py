@@ -3,7 +3,6 @@
 What is hidden is written here; what must be found follows from it by the definitions in docs/frames-and-signs.md.
 """
 
-import json
 import math
 import subprocess
 import tomllib
@@ -17,8 +16,6 @@ from tests.tools.calibrate.feeds import rot
 SEED = 4
 YAW_DEG, CONTACT_M, MARKER = 3.0, (0.015, -0.02), (0.12, -0.04, 0.3)
 RIG = np.array([[0.0, 0.0, 1.0], [0.2578500325, -0.9661849516, 0.0], [0.9661849516, 0.2578500325, 0.0]])
-START_M = (0.05, 0.04)
-"""Where the ball stands at the start: 5 cm left of the path, give or take the seed's fifth of that."""
 HIDDEN = f"""
 extends = "emulated"
 name = "hidden"
@@ -99,8 +96,6 @@ def test_three_presses_confirm_the_mounting_or_find_it(folder):
     assert told["value"] == 0.0
     # The rig says that the sensor is turned by 90 degrees about its own axis; in the world it is not.
     wrong = (RIG @ rot("z", 90)).tolist()
-    rig = tomllib.loads(HIDDEN)["world"]["truth"]
-    assert rig["sensor_yaw_deg"] == 3.0
     words = ("--set", f"frames.base_from_sensor={wrong}", "--set", "world.truth.sensor_yaw_deg=90")
     told, fragment = calibrated(folder, "sign", *words)
     proposed = np.array(fragment["frames"]["base_from_sensor"])
@@ -144,4 +139,3 @@ def test_a_rig_takes_what_was_measured_and_is_kept(folder):
     looked = finished(folder / "state", "doctor", "hidden.toml", "--json", cwd=folder, within_s=120.0).last_object
     age = next(row for row in looked["checks"] if row["check"] == "rig.calibration-age")
     assert age["evidence"] == "never calibrated: the contact point"
-    assert json.loads(json.dumps(looked))["rig"] == "hidden"

@@ -95,7 +95,7 @@ def _direction(name: str, force: Array) -> Array:
 
 
 def _result(fit: Fit, now: Array, keys: dict[str, Matrix3], told: str) -> Estimate:
-    turned = angle_between_deg(now, fit.rotation)
+    turned = angle_between_deg(now, fit.rotation) if keys else 0.0
     return Estimate(
         "sign", (turned,), (fit.worst_deg,), "deg", (fit.mean_deg,), "pressed forward, left and up", dict(keys), (told,)
     )
