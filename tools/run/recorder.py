@@ -168,6 +168,7 @@ class Recorder:
             lost=self._lost,
             undecodable=self._log.undecodable,
             object_poses=self._log.object_poses,
+            latencies=self._log.latencies,
         )
 
 
