@@ -87,7 +87,8 @@ def _speed(twist: BodyTwist) -> float:
 
 
 def _heading_error(yaw: float, control: ControlState) -> float:
-    return wrap_angle(yaw - control.held_yaw) if control.tared and math.isfinite(yaw) else math.nan
+    turned = yaw - control.held_yaw
+    return wrap_angle(turned) if control.tared and math.isfinite(turned) else math.nan
 
 
 def _stop_distance(sent: float, measured: float) -> float:

@@ -44,6 +44,7 @@ class TorqueOf:
             calm = median_of_three(older[0], older[-1], reading.torque)
             self._newest = [*older[-1:], reading.torque] if self._newest else [reading.torque]
             yaw = tick.input.base.pose.yaw
+            yaw = yaw if math.isfinite(yaw) else math.nan  # which has a cosine
             sample = force_on_slider_world(calm, before.bias_torque, self._base_from_sensor, yaw)
             dt_s = min(max((reading.received_ns - self._last_ns) * 1e-9, 0.0), MAX_DT_S)
             self._torque = low_pass(self._torque, sample, dt_s, self._tau_s) if self._valid else sample
