@@ -52,6 +52,14 @@ COMMANDS = {
         "force, arm and base, live; nothing moves",
         ("push watch emulated", "push watch my-rig.toml --json"),
     ),
+    "calibrate": Command(
+        "tools.commands.calibrate",
+        "measure tare, frames, contact point or path, by hand; nothing is moved",
+        (
+            "push calibrate bias emulated --rehearse",
+            "push calibrate frame my-rig.toml --cord 0,120,240 --apply my-rig.toml",
+        ),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",

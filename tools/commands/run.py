@@ -7,6 +7,8 @@ import socket
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
@@ -230,7 +232,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
-    return with_injected(summary, launcher.injected(figures))
+    return with_injected(summary, launcher.injected(figures)) | {"latency": launcher.latencies()}
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
@@ -281,7 +283,7 @@ def lockstep_summary(
         witness=Witness(),
         pushed=object_pose(rig.path, log.object_poses),
     )
-    return with_injected(summary, figures["injected"])
+    return with_injected(summary, figures["injected"]) | {"latency": msgspec.to_builtins(log.latencies)}
 
 
 def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
