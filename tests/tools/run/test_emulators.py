@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
+from pathlib import Path
 
 import pytest
 
@@ -21,8 +21,8 @@ def loop():
         yield loop
 
 
-def descriptors() -> set[str]:
-    return set(os.listdir("/proc/self/fd"))
+def descriptors() -> set[Path]:
+    return set(Path("/proc/self/fd").iterdir())
 
 
 def test_each_device_is_reached_at_an_address_of_its_own(loop):
