@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
-from tools.commands.run_outputs import save_tare, write_report, write_summary
+from tools.commands.run_outputs import save_tare, unused_faults, with_injected, write_report, write_summary
 from tools.commands.run_trials import check_trials, run_battery
+from tools.live.arguments import add_live_arguments
+from tools.live.view import check_live, live_view
 from tools.places import run_dir, saved_tare
 from tools.places.device_locks import DeviceLocks
+from tools.places.running import announced
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
@@ -69,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--trials", type=whole_number(1, 1000), metavar="N", help="a battery: N pushes, asking before each, and a table"
     )
     parser.add_argument("--note", type=note, default="", metavar="TEXT", help="a remark, kept in log and report")
+    add_live_arguments(parser)
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
@@ -180,6 +185,8 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
     check_room(rig, args.seed)
     if args.trials and not (args.dry_run or args.check):
         check_trials(args, rig)
+    if args.live:
+        check_live(args.live_port, fast=args.fast)
 
 
 def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
@@ -202,8 +209,16 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
         allow_descriptors(MOST_DESCRIPTORS)
 
-        live, folder = LiveLine(rig), folder_of(args.rig)
-        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=live, kind_folder=folder, note=args.note)
+        launcher = Launcher(
+            rig,
+            out,
+            seed=args.seed,
+            saved=saved,
+            live=LiveLine(rig),
+            kind_folder=folder_of(args.rig),
+            note=args.note,
+            live_port=args.live_port if args.live else None,
+        )
         with awake():
             figures = launcher.run()
     except BaseException:
@@ -228,12 +243,20 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+    """Run level sim, with its live view where one is wanted, and return its summary."""
+    with live_view(args.live_port if args.live else None) as to_view:
+        return lockstep_summary(args, rig, out, saved, to_view)
+
+
+def lockstep_summary(
+    args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None, to_view: socket.socket | None
+) -> dict[str, Any]:
     """Run level sim in this process and return its summary."""
     from tools.run.lockstep import Lockstep, open_log
     from tools.run.paced import PacedRun, run_fast
 
     text = run_dir.write_config(out, rig)
-    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved)
     except PushError:  # an impossible world: nothing has started
@@ -243,7 +266,8 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
     live = LiveLine(rig)
     try:
         try:
-            figures = run_fast(one) if args.fast else PacedRun(one, live).run()
+            with announced(rig, out / "run.mcap"):
+                figures = run_fast(one) if args.fast else PacedRun(one, live).run()
         finally:
             live.close()
             log.finish({})
@@ -267,13 +291,3 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         pushed=object_pose(rig.path, log.object_poses),
     )
     return with_injected(summary, figures["injected"])
-
-
-def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
-    """Return the summary and, if faults were injected, how many samples each has changed."""
-    return summary | {"injected": counts} if counts else summary
-
-
-def unused_faults(summary: dict[str, Any]) -> list[str]:
-    """Return the faults to inject that changed nothing."""
-    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]

@@ -2,6 +2,7 @@
 
     emulators   one process with the world and its wire servers (emulated devices only)
     recorder    drains the log rings into run.mcap, finishes it when control has ended
+    live        serves what is recorded to viewers (with --live); nothing depends on it
     gate        sole holder of the base connection
     arm         the ur_rtde library, publishing a shared record
     control     the loop: sensor, law, supervisor, envelope, one frame to the gate per tick
@@ -27,11 +28,13 @@ from robot_io.rig.config import RigConfig
 from robot_io.rig.fault_words import parse_fault
 from safety.gate import Latch
 from tools.kinds import name_of
+from tools.live.view import where_words
 from tools.places import run_dir
 from tools.places.atomic_file import write_json
 from tools.places.running import announce, forget
 from tools.places.saved_tare import SavedTare
-from tools.run.facts.ended import final_figures, process_notes
+from tools.run.facts.ended import final_figures
+from tools.run.facts.process_notes import process_notes, warn_without_realtime
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
@@ -56,7 +59,7 @@ BEAT_NS = NS_PER_S // 10
 """How often control is told that the launcher lives: silent for 0.5 s, the base holds, for 2 s, it stops (F73)."""
 SECOND_STOP_NS = NS_PER_S
 """A second stop counts only this long after the first: `timeout` and shells may send one stop twice."""
-ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0}
+ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0, "live": 1.0}
 """Processes in the order in which they end."""
 
 
@@ -73,6 +76,7 @@ class Launcher:
         live: LiveLine,
         kind_folder: str,
         note: str = "",
+        live_port: int | None = None,
     ) -> None:
         self._rig = rig
         self._out = out
@@ -81,7 +85,14 @@ class Launcher:
         self.log = out / "run.mcap"
         self.notes: list[str] = []
         self._processes = Processes(
-            rig, seed=seed, saved=saved, log=self.log, kind_folder=kind_folder, note=note, on_spawn=self._listen
+            rig,
+            seed=seed,
+            saved=saved,
+            log=self.log,
+            kind_folder=kind_folder,
+            note=note,
+            live_port=live_port,
+            on_spawn=self._listen,
         )
         self._children = self._processes.children
         self._began = self._ending = self._paused = self._killed_by_operator = False
@@ -148,21 +159,18 @@ class Launcher:
         names = self._processes.start_remaining(run_dir.write_config(self._out, self._rig))
         pids = {"launcher": os.getpid(), **self._processes.pids}
         write_json(self._out / "processes.json", {"schema": 1, **pids})
-        announce(self._rig, pids)
+        announce(self._rig, pids, self.log)
         self._wait_ready(names, READY_NS)
-        self._warn_without_realtime()
+        warn_without_realtime(self._children, self._live.say)
         if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full
             raise errors[0]
         self._began = True
         self._processes.send_to_control(b"GP" if self._paused else b"G")
 
-    def _warn_without_realtime(self) -> None:
-        plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
-        if plain:
-            self._live.say(f"no permission for real-time priority for {', '.join(plain)}: only 100 Hz is supported")
-
     def _listen(self, child: Child) -> None:
         self._loop.add_fd(child.status.fd, lambda _events: self._hear(child))
+        if child.name == "live":
+            self._live.say(where_words(child))
 
     def _hear(self, child: Child) -> None:
         for event in child.hear():
@@ -185,6 +193,8 @@ class Launcher:
             if child.name == "emulators" and not self._ending:
                 self._emulators_died_ns = monotonic_ns()
                 self._live.say("the emulators have ended: every emulated device is gone")
+            elif child.name == "live" and not self._ending:
+                self._live.say("the live view has ended; the run goes on")
 
     def _wait_ready(self, names: list[str], within_ns: int) -> None:
         """Wait until all are ready. Raises PushError naming everything that failed and what to do about each."""

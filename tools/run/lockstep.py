@@ -5,6 +5,7 @@ Two runs with the same rig and seed give identical files: log times start at a f
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -34,6 +35,7 @@ from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
 from tools.kinds import is_shipped, name_of
+from tools.live.feed import LiveFeed
 from tools.log.run_log import RunLog
 from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
@@ -196,10 +198,19 @@ class Lockstep:
         )
 
 
-def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool, note: str = "") -> RunLog:
-    """Open the log of a lockstep run; its facts hold nothing that differs from run to run."""
+def open_log(
+    path: Path,
+    config_text: str,
+    seed: int,
+    *,
+    in_contact: bool,
+    note: str = "",
+    to_view: socket.socket | None = None,
+) -> RunLog:
+    """Open the log of a lockstep run; its facts hold nothing that differs from run to run. to_view: a live view's."""
     facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact, note=note)
-    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
+    also = LiveFeed(to_view).add if to_view is not None else None
+    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS, also=also)
 
 
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:
