@@ -35,7 +35,7 @@ COMMANDS = {
     "run": Command(
         "tools.commands.run",
         "one push, on hardware, emulated or simulated",
-        ("push run emulated --distance-m 2", "push run sim --fast --seed 3 --json"),
+        ('push run emulated --distance-m 2 --note "box, 2 kg"', "push run sim --fast --trials 3 --json"),
     ),
     "stop": Command(
         "tools.commands.stop",

@@ -13,7 +13,7 @@ from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
-from tools.commands.run_outputs import save_tare, write_report, write_summary
+from tools.commands.run_outputs import save_tare, unused_faults, with_injected, write_report, write_summary
 from tools.commands.run_trials import check_trials, run_battery
 from tools.live.arguments import add_live_arguments
 from tools.live.view import check_live, live_view
@@ -284,13 +284,3 @@ def lockstep_summary(
         pushed=object_pose(rig.path, log.object_poses),
     )
     return with_injected(summary, figures["injected"]) | {"latency": msgspec.to_builtins(log.latencies)}
-
-
-def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
-    """Return the summary and, if faults were injected, how many samples each has changed."""
-    return summary | {"injected": counts} if counts else summary
-
-
-def unused_faults(summary: dict[str, Any]) -> list[str]:
-    """Return the faults to inject that changed nothing."""
-    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]
