@@ -19,6 +19,8 @@ from tests.wire.bridge_process import running_bridge
 from tests.wire.ft300_process import ft300_process
 from tests.wire.ur_process import EmulatorProcess as UrProcess
 from tests.wire.ur_process import wait_until
+from tools.places.device_locks import DeviceLocks
+from tools.rig import resolve_rig
 
 FRAME = b"\x1b[H"
 ALTERNATE, NORMAL = b"\x1b[?1049h", b"\x1b[?1049l"
@@ -116,6 +118,16 @@ def test_where_there_is_no_terminal_it_prints_lines(state):
         assert "\x1b" not in watch.out
         watch.signal(signal.SIGHUP)
         assert watch.wait().code == 0
+
+
+def test_devices_that_are_all_in_use_are_not_opened(state, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(state))
+    where = {"ft.port": "socket://127.0.0.1:1", "arm.host": "127.0.0.1", "base.url": "ws://127.0.0.1:2"}
+    keys = [f"{key}={value}" for key, value in where.items()] + [f"{d}.level=hardware" for d in ("ft", "arm", "base")]
+    with DeviceLocks(resolve_rig("emulated", keys)):
+        settings = [word for key in keys for word in ("--set", key)]
+        error = one_error(finished(state, "watch", "emulated", "--json", *settings), 3)
+    assert f"process {os.getpid()}" in error["what"]
 
 
 def test_at_level_sim_there_is_nothing_to_watch(state):
