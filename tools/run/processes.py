@@ -8,7 +8,7 @@
     pidfds             gate, arm, recorder -> control                readable when the process has ended
     run pipe           control -> arm, emulators                     nothing is written: EOF means control has ended
     live feed          recorder -> live                              SEQPACKET, with --live; drops, nobody waits
-    operator pipe      launcher -> control                           a byte each: go, stop, resume, log failed, alive
+    operator pipe      launcher -> control                           a byte each: go, stop, pause, ..., alive
     status pipes       each of them -> launcher                      JSON lines
 
 A copy of an inherited descriptor left open in the launcher would hide the end of the process that holds it, so all
@@ -58,7 +58,7 @@ MOST_DESCRIPTORS = 128
 class Processes:
     """Starts the processes of one run, by `start_emulators` and `start_remaining`; `children` has them by name.
 
-    saved: the tare of a run that starts in contact. log: where the recorder writes.
+    saved: the tare of a run that starts in contact. log: where the recorder writes. note: the operator's, for the log.
     kind_folder: another place to look for modules of the rig's kinds. live_port: where to serve a live view, None for
     none. on_spawn: called with each child as soon as it has been started.
     """
@@ -71,6 +71,7 @@ class Processes:
         saved: SavedTare | None,
         log: Path,
         kind_folder: str,
+        note: str,
         live_port: int | None,
         on_spawn: Callable[[Child], None],
     ) -> None:
@@ -79,6 +80,7 @@ class Processes:
         self._saved = saved
         self._log = log
         self._kind_folder = kind_folder
+        self._note = note
         self._live_port = live_port
         self._on_spawn = on_spawn
         self._offset_ns = wall_offset_ns()
@@ -134,7 +136,10 @@ class Processes:
         return ["recorder", "gate", "arm", "control"]
 
     def send_to_control(self, key: bytes) -> None:
-        """Send G (go), S (stop), R (resume), L (log failed) or H (alive) to control; ignored if it is not running."""
+        """Send bytes to control: G (go), S (stop), R (resume), P (pause), C (continue), L (log failed), H (alive).
+
+        Ignored if it is not running.
+        """
         if self._operator_fd >= 0:
             with contextlib.suppress(OSError):
                 os.write(self._operator_fd, key)
@@ -159,7 +164,7 @@ class Processes:
         return with_addresses(self._rig, ready.get("addresses", {}))
 
     def _start_recorder(self, config_text: str) -> None:
-        facts = run_facts(self._rig, self._seed, in_contact=self._saved is not None)
+        facts = run_facts(self._rig, self._seed, in_contact=self._saved is not None, note=self._note)
         facts["kernel"] = platform.release()
         rings = [RingSource(name, ring.fd) for name, ring in self._rings.items()]
         alive = [self._alive[name][0] for name in ("control", "gate", "world")]

@@ -219,7 +219,7 @@ def test_keys_that_signal_end_it_too(state, key):
 
 
 def test_a_simulated_run_is_watched_through_its_log(state, tmp_path):
-    argv = ("run", "sim", "--distance-m", "0.2", "--out", str(tmp_path / "out"), *QUICK)
+    argv = ("run", "sim", "--distance-m", "0.6", "--out", str(tmp_path / "out"), *QUICK)
     with started(state, *argv) as run:
         run.wait_for("APPROACH|PUSH")
         with started(state, "watch", "sim", "--json") as watch:
