@@ -52,6 +52,14 @@ COMMANDS = {
         "force, arm and base, live; nothing moves",
         ("push watch emulated", "push watch my-rig.toml --json"),
     ),
+    "calibrate": Command(
+        "tools.commands.calibrate",
+        "measure tare, frames, contact point or path, by hand; nothing is moved",
+        (
+            "push calibrate bias emulated --rehearse",
+            "push calibrate frame my-rig.toml --cord 0,120,240 --apply my-rig.toml",
+        ),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",
@@ -59,8 +67,8 @@ COMMANDS = {
     ),
     "report": Command(
         "tools.commands.report",
-        "figures and one self-contained page of a log",
-        ("push report runs/demo/run.mcap", "push report runs/demo/run.mcap --json"),
+        "the page of a run, or one page that compares several",
+        ("push report runs/demo --png", "push report runs/one runs/two --out runs/compared --gif"),
     ),
     "view": Command(
         "tools.commands.view",

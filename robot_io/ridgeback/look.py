@@ -137,16 +137,18 @@ class RidgebackLook:
         nearest = min(range(len(times)), key=lambda i: times[i])
         return RoundTrip(sorted(times)[len(times) // 2], max(times), offsets[nearest], "rosapi")
 
-    def listen(self, least_s: float, most_s: float) -> Heard:
+    def listen(self, least_s: float, most_s: float, until: Callable[[], bool] = lambda: True) -> Heard:
         """Subscribe to everything, also to the command topic; return what comes.
 
-        Ends after `least_s` when every topic that is needed has spoken, at the latest after `most_s`.
+        Ends after `least_s` when every topic that is needed has spoken and `until` (called ten times a second and more)
+        is true, at the latest after `most_s`.
         """
         samples: list[Stamped[BaseFeed]] = []
         began_ns = self._clock()
         intake = self.subscribe()
         while (now_ns := self._clock()) - began_ns < most_s * NS_PER_S:
-            if now_ns - began_ns > least_s * NS_PER_S and not self._reader.silent_topics():
+            over = until() and now_ns - began_ns > least_s * NS_PER_S
+            if over and not self._reader.silent_topics():
                 break
             samples += self.heard_by(intake, now_ns + NS_PER_S // 10)
         span_s = (self._clock() - began_ns) / NS_PER_S

@@ -21,7 +21,8 @@ _MOST_CHARACTERS = 64 << 10
 _MOST_DOTS = 200
 """In a key. `tomllib` takes memory by the square of a key's parts, and the text may come out of a log."""
 _BETWEEN_KEYS = re.compile(r"[,={}\[\]\n\r]")
-_HEADER = re.compile(r"\[([^\[\]]+)\]\s*(?:#.*)?\Z")
+_HEADER = re.compile(r"(?:\[([^\[\]]+)\]|\[\[([^\[\]]+)\]\])\s*(?:#.*)?\Z")
+"""Of a table, or of one in a list of tables."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _KEY = re.compile(r"([A-Za-z0-9_.\-\"' \t]+)=")
 
@@ -45,13 +46,21 @@ def parse(text: str, name: str) -> tuple[dict[str, Any], Origins]:
     return data, _origins(text, name)
 
 
+def origin_of(path: KeyPath, origins: Origins, name: str) -> str:
+    """Return where `path`, or else the nearest table around it, was written; `name` where neither was."""
+    for depth in range(len(path), 0, -1):
+        if path[:depth] in origins:
+            return origins[path[:depth]]
+    return name
+
+
 def _origins(text: str, name: str) -> Origins:
     origins: Origins = {}
     table: KeyPath = ()
     for number, line in enumerate(text.splitlines(), start=1):
         line = line.strip()
         if header := _HEADER.match(line):
-            table = _split(header[1])
+            table = _split(header[1] or header[2])
             origins.setdefault(table, f"{name}:{number}")
         elif key := _KEY.match(line):
             origins.setdefault(table + _split(key[1]), f"{name}:{number}")
@@ -107,6 +116,19 @@ def emit(data: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def with_origins(text: str, origins: Origins) -> str:
+    """Return what `emit` wrote with the origin of each value as a comment; one without has its default."""
+    lines: list[str] = []
+    table: KeyPath = ()
+    for line in text.splitlines():
+        if header := _HEADER.match(line):
+            table = _split(header[1] or header[2])
+        elif key := _KEY.match(line):
+            line += f"  # {origins.get(table + _split(key[1]), 'default')}"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
 def _emit_table(data: Mapping[str, Any], path: KeyPath, lines: list[str]) -> None:
     if path:
         lines += ["", f"[{'.'.join(map(_emit_key, path))}]"]
@@ -135,5 +157,8 @@ def _emit_value(value: Any) -> str:
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case list() | tuple():
             return "[" + ", ".join(_emit_value(item) for item in value) + "]"
+        case Mapping():
+            pairs = (f"{_emit_key(key)} = {_emit_value(item)}" for key, item in value.items() if item is not None)
+            return "{ " + ", ".join(pairs) + " }"
         case _:
             raise TypeError(f"no TOML form for {type(value).__name__}")

@@ -7,6 +7,8 @@ import socket
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
@@ -69,11 +71,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--drive-blind", action="store_true", help="let a real base move although its sensor or arm is emulated"
     )
-    add_live_arguments(parser)
     parser.add_argument(
         "--trials", type=whole_number(1, 1000), metavar="N", help="a battery: N pushes, asking before each, and a table"
     )
     parser.add_argument("--note", type=note, default="", metavar="TEXT", help="a remark, kept in log and report")
+    add_live_arguments(parser)
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
@@ -209,9 +211,15 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
         allow_descriptors(MOST_DESCRIPTORS)
 
-        live, folder, port = LiveLine(rig), folder_of(args.rig), args.live_port if args.live else None
         launcher = Launcher(
-            rig, out, seed=args.seed, saved=saved, live=live, kind_folder=folder, note=args.note, live_port=port
+            rig,
+            out,
+            seed=args.seed,
+            saved=saved,
+            live=LiveLine(rig),
+            kind_folder=folder_of(args.rig),
+            note=args.note,
+            live_port=args.live_port if args.live else None,
         )
         with awake():
             figures = launcher.run()
@@ -233,7 +241,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
-    return with_injected(summary, launcher.injected(figures))
+    return with_injected(summary, launcher.injected(figures)) | {"latency": launcher.latencies()}
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
@@ -250,8 +258,7 @@ def lockstep_summary(
     from tools.run.paced import PacedRun, run_fast
 
     text = run_dir.write_config(out, rig)
-    path, in_contact = out / "run.mcap", saved is not None
-    log = open_log(path, text, args.seed, in_contact=in_contact, note=args.note, to_view=to_view)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved)
     except PushError:  # an impossible world: nothing has started
@@ -285,7 +292,7 @@ def lockstep_summary(
         witness=Witness(),
         pushed=object_pose(rig.path, log.object_poses),
     )
-    return with_injected(summary, figures["injected"])
+    return with_injected(summary, figures["injected"]) | {"latency": msgspec.to_builtins(log.latencies)}
 
 
 def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:

@@ -33,7 +33,8 @@ from tools.places import run_dir
 from tools.places.atomic_file import write_json
 from tools.places.running import announce, forget
 from tools.places.saved_tare import SavedTare
-from tools.run.facts.ended import final_figures, process_notes
+from tools.run.facts.ended import final_figures
+from tools.run.facts.process_notes import process_notes, warn_without_realtime
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
@@ -141,8 +142,12 @@ class Launcher:
 
     def pushed(self) -> ObjectPose | None:
         """Return where the object is, once `run` has returned; None if that is not known."""
-        poses = self._finished_event("recorder").get("object_poses")
-        return object_pose(self._rig.path, msgspec.convert(poses, tuple[Pose2D, Pose2D] | None))
+        poses = msgspec.convert(self._finished_event("recorder").get("object_poses"), tuple[Pose2D, Pose2D] | None)
+        return object_pose(self._rig.path, poses)
+
+    def latencies(self) -> dict[str, Any]:
+        """Return how old messages were when they arrived, by topic, once `run` has returned."""
+        return dict(self._finished_event("recorder").get("latencies", {}))
 
     def injected(self, figures: dict[str, Any]) -> dict[str, int]:
         """Return how many samples each injected fault changed, by its words; none for a process that did not say."""
@@ -151,8 +156,6 @@ class Launcher:
         words = {parse_fault(word).text for word in self._rig.faults.inject}
         return by_control | {word: n for word, n in by_gate.items() if word in words}
 
-    # --- start -----------------------------------------------------------------------------------------------
-
     def _start(self) -> None:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)
         names = self._processes.start_remaining(run_dir.write_config(self._out, self._rig))
@@ -160,16 +163,11 @@ class Launcher:
         write_json(self._out / "processes.json", {"schema": 1, **pids})
         announce(self._rig, pids, self.log)
         self._wait_ready(names, READY_NS)
-        self._warn_without_realtime()
+        warn_without_realtime(self._children, self._live.say)
         if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full
             raise errors[0]
         self._began = True
         self._processes.send_to_control(b"GP" if self._paused else b"G")
-
-    def _warn_without_realtime(self) -> None:
-        plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
-        if plain:
-            self._live.say(f"no permission for real-time priority for {', '.join(plain)}: only 100 Hz is supported")
 
     def _listen(self, child: Child) -> None:
         self._loop.add_fd(child.status.fd, lambda _events: self._hear(child))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ def summary(
     figures: what control reported at its end. note: the operator's. witness: what else is known of the run. pushed:
     where the object is, as far as that is known.
     """
-    trust = gather(rig, figures, witness)
+    trust = gather(rig, figures, witness, time.time())
     judged = judge(figures["exit_code"], trust)
     return {
         "schema": 1,

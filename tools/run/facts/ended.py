@@ -1,33 +1,13 @@
-"""How the processes of a wall-clock run ended, and the figures that control left, or its log."""
+"""The figures that control left at its end, or its log."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from robot_io.errors import OperatorStop, PushError, SafetyStop
 from robot_io.ipc.spawn import Child
 from tools.run.facts.figures_from_log import figures_from_log
-
-
-def process_notes(children: Mapping[str, Child]) -> list[str]:
-    """Return what went wrong in the processes other than control, once all have ended."""
-    notes = []
-    for name in ("gate", "emulators", "arm", "recorder", "live"):
-        child = children.get(name)
-        if child is not None and child.errors:
-            notes.append(f"{name}: {child.errors[-1].what}")
-        elif child is not None and child.process.returncode != 0:
-            notes.append(f"the {name} process {child.how_it_ended()}")
-    recorded = children["recorder"].finished or {}
-    if not recorded.get("complete", False):
-        notes.append("the log is not complete: `push log recover` may repair it")
-    if dropped := sum(recorded.get("dropped", {}).values()):
-        notes.append(f"{dropped} records did not fit into the log's ring buffers")
-    if unseen := (recorded.get("live") or {}).get("dropped", 0):
-        notes.append(f"the live view missed {unseen} messages; the log has them")
-    return notes
 
 
 def final_figures(
