@@ -112,9 +112,12 @@ def test_killed_it_leaves_no_process_and_no_stream_behind_and_meanwhile_no_run_s
         assert not sensor.ask("counters")["streaming"]
 
 
-def test_where_there_is_no_terminal_it_prints_lines(state):
-    with started(state, "watch", "emulated") as watch:
-        wait_until(lambda: "holding" in watch.out and watch.out.count("\n") >= 3, "lines", 30.0)
+def test_where_there_is_no_terminal_it_prints_lines_and_shows_the_hands_of_the_rig(state):
+    hand = "world.hand=[{at_s = 6.0, for_s = 60.0, force_body_N = [0.0, 12.0, 0.0]}]"
+    with started(state, "watch", "emulated", "--set", hand) as watch:
+        wait_until(lambda: "LEFT 1" in watch.out and watch.out.count("\n") >= 3, "lines", 40.0)
+        assert "no force" in watch.out
+        assert "BODY" in watch.out
         assert "\x1b" not in watch.out
         watch.signal(signal.SIGHUP)
         assert watch.wait().code == 0
