@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 
 from control.notes.run_notes import outcome
-from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
+from robot_io.rig.config import RigConfig, load_rig
+from robot_io.rig.files import shipped_rigs
 from robot_io.tick import Phase
 from tools.kinds import device_names
 from tools.report.bounded_series import Floats

@@ -8,6 +8,7 @@ import msgspec
 
 from control.notes.push_course import PushCourse
 from control.notes.run_notes import outcome
+from robot_io.clock import NS_PER_S
 from robot_io.tick import ControlTick, Mode
 from safety.faults import FAULTS
 from tools.report.run_data import RunData
@@ -39,7 +40,7 @@ def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
             "Did not start", "The loop did not start: the devices were not ready, or it was stopped first.", False
         )
     end = _figures(run, run.last)
-    trust = _told(summary) or tuple(gather(run.rig, end, _witness(run)))
+    trust = _told(summary) or tuple(gather(run.rig, end, _witness(run), _ended_s(run, run.last)))
     distance, lateral = f"{end['distance_m']:.2f} m", f"{end['lateral_error_m']:+.3f} m"
     first = first_fault(run.rig, end)
     why = cause_words(first, end["faults"]) if first else _without_first(end["faults"])
@@ -90,6 +91,12 @@ def _witness(run: RunData) -> Witness:
     counted = [value for key, value in run.facts.items() if key.startswith("dropped_") or key == "undecodable"]
     missing = sum(int(value) for value in counted if value.isdecimal())
     return Witness(f"recovered, {run.recovered}" if run.recovered else "", missing)
+
+
+def _ended_s(run: RunData, last: ControlTick) -> float | None:
+    """Return when a run ended (s since the epoch), None where its log does not tell."""
+    offset = run.facts.get("wall_offset_ns", "")
+    return (last.input.now_ns + int(offset)) / NS_PER_S if offset.lstrip("-").isdecimal() else None
 
 
 def _told(summary: dict[str, Any]) -> tuple[TrustItem, ...]:
