@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="WORDS",
-        help='inject a fault, at levels sim and emulated: "ft.frozen at 3 s for 1 s"',
+        help='inject a fault, at levels sim and emulated: "ft.frozen at 10 s for 1 s"',
     )
     parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
     parser.add_argument(
