@@ -37,6 +37,7 @@ from robot_io.tick import (
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
+PAUSE, GO_ON = b"PC"
 LOG_LOST = b"L"[0]
 """The launcher reports that the recorder can no longer write: treated as if it were gone."""
 BEAT = b"H"[0]
@@ -119,8 +120,10 @@ class ControlLoop:
         self._taken = 0
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator = Operator.NONE
+        self._paused = False
         self._launcher, self._recorder = Silence(), Silence()
         self._consumed = 0
+        self._last_tick_ns = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
@@ -184,14 +187,12 @@ class ControlLoop:
             self._operator_fd = -1
             typed = b"S"
         for key in typed:
-            if key == BEAT:
-                continue
-            if key == LOG_LOST:
+            if key in (PAUSE, GO_ON):
+                self._paused = key == PAUSE
+            elif key == LOG_LOST:
                 self._watch.gone.add("recorder")
-                continue
-            event = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
-            if self._operator != Operator.STOP:
-                self._operator = event
+            elif key != BEAT and self._operator != Operator.STOP:
+                self._operator = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
 
     def _on_gone(self, name: str, _events: int) -> None:
         self._watch.gone.add(name)
@@ -214,7 +215,8 @@ class ControlLoop:
         except Exception as error:  # top level of the loop: whatever failed, the base gets zero and the log records it
             self._give_up(inp, error)
         self.last_ns = now_ns
-        self.timing.note(paced.late_ns, paced.skipped, self._clock() - now_ns)
+        self._last_tick_ns = self._clock() - now_ns
+        self.timing.note(paced.late_ns, paced.skipped, self._last_tick_ns)
 
     def _one_tick(self, inp: TickInput) -> None:
         after, output = self._fold(self._state, inp)
@@ -275,10 +277,12 @@ class ControlLoop:
                 self._launcher.so_far_ns(now_ns),
                 self._recorder.so_far_ns(now_ns),
                 self._asleep_ns,
+                self._last_tick_ns,
             ),
             ft_input(readings, self._health, self._taken),
             self._arm_record,
             self._base.read(),
+            self._paused,
         )
 
 

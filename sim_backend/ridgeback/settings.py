@@ -28,6 +28,8 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
     base_rate_error: float = 0.0001
     base_from_marker: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """x (m), y (m), yaw (rad) of the marker frame in the BODY frame."""
+    ball_in_base_m: tuple[float, float] = (1.0, 0.0)
+    """Where the contact ball is in the BODY frame: motion capture sees a marker on it, where `ball_pose` names one."""
     marker_error: Pose2D = Pose2D()
     """Where a driver with the rig's frames takes the base to be, seen from the base; for one without markers."""
     slider_offset_m: tuple[float, float] = (0.0, 0.0)
@@ -62,6 +64,7 @@ def ridgeback_settings(rig: RigConfig, seed: int) -> RidgebackSettings:
         mocap_rate_hz=rig.world.mocap_rate_hz,
         base_phase=rig.world.base_phase,
         base_rate_error=rig.world.base_tick_rate_error,
+        ball_in_base_m=true_frames(rig).contact_in_base_m[:2],
         base_from_marker=true_frames(rig).base_from_marker,
         marker_error=marker_error(rig),
         slider_offset_m=rig.world.truth.slider_offset_m,

@@ -97,5 +97,5 @@ def _calibration(rows: Rows, rig: RigConfig) -> None:
         told = f"calibrated: {', '.join(rig.calibration.made())}"
         rows.ok("calibration-age", told, age.oldest_days, limit, "days")
         return
-    fix = "Measure them: one degree of the sensor costs about a decimetre beside the path"
+    fix = "`push calibrate` measures them: one degree of the sensor costs about a decimetre beside the path"
     rows.bad("calibration-age", "warning", age.words, fix, age.oldest_days, limit, "days")
