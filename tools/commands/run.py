@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
     )
-    add_faults(parser, 'inject a fault, at levels sim and emulated: "ft.frozen at 3 s for 1 s"')
+    add_faults(parser, 'inject a fault, at levels sim and emulated: "ft.frozen at 10 s for 1 s"')
     parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
     parser.add_argument(
         "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
