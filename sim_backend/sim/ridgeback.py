@@ -14,6 +14,7 @@ from typing import Literal
 from robot_io.clock import NS_PER_S, SIM_WALL_OFFSET_NS, ClockNs
 from robot_io.driver import DriverBase
 from robot_io.errors import DeviceNotReady
+from robot_io.geometry import compose
 from robot_io.messages import (
     BaseFeed,
     BaseOdometry,
@@ -35,6 +36,7 @@ from sim_backend.ridgeback.feeds import seen_from
 from sim_backend.ridgeback.noise import FeedNoise
 from sim_backend.ridgeback.settings import RidgebackSettings
 from sim_backend.world.plant import BaseSource
+from sim_backend.world.truth import point_of
 
 FILTERED_RATE_HZ = 50.0
 STATUS_RATE_HZ = 1.0
@@ -161,11 +163,17 @@ class SimRidgeback(DriverBase):
                 samples.append(self._stamped("pose", BasePose(pose), arrival_ns, t_ns))
             return samples
         if self._pose_source != "odometry":
-            samples.append(self._stamped("pose", BasePose(self._base_noise.pose(truth.pose)), arrival_ns, t_ns))
+            samples.append(self._stamped("pose", BasePose(self._seen(truth.pose)), arrival_ns, t_ns))
         if self._settings.topics.slider_pose:
-            slider = SliderPose(self._slider_noise.pose(self._source.read_slider(t_ns)))
-            samples.append(self._stamped("slider", slider, arrival_ns, t_ns))
+            slider = self._slider_noise.pose(self._source.read_slider(t_ns))
+            seen = SliderPose(point_of(slider, self._settings.slider_offset_m))
+            samples.append(self._stamped("slider", seen, arrival_ns, t_ns))
         return samples
+
+    def _seen(self, base: Pose2D) -> Pose2D:
+        """Return the base's pose as a driver of the rig would find it from the markers."""
+        pose, error = self._base_noise.pose(base), self._settings.marker_error
+        return pose if self._pose_source != "mocap" or error == Pose2D() else compose(pose, error)
 
     def _stamped(self, kind: str, value: BaseFeed, arrival_ns: int, t_ns: int) -> Stamped[BaseFeed]:
         seq = self._seq[kind]
