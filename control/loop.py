@@ -34,6 +34,7 @@ from robot_io.tick import (
     TickInput,
     TickOutput,
     TickState,
+    link_number,
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
@@ -296,7 +297,7 @@ def ft_input(
             FtReading(s.received_ns, s.seq, (s.value.fx, s.value.fy, s.value.fz), (s.value.mx, s.value.my, s.value.mz))
             for s in readings
         ),
-        int(health.state),
+        link_number(health.state),
         counters.get("packets_ok", taken),
         counters.get("crc_fail", 0),
         counters.get("junk_bytes", 0),
