@@ -34,6 +34,7 @@ from robot_io.tick import (
     TickInput,
     TickOutput,
     TickState,
+    link_number,
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
@@ -109,21 +110,17 @@ class ControlLoop:
         self._on_status = on_status
         self._clock = clock
         self._read_asleep_ns = asleep
-        self._asleep_ns = 0
         self._loop = EventLoop()
         self._timer: Timer | None = None
-        self._tick = -1
+        self._tick = self._sensor_fd = -1
         self._most_readings = round(FLOOD_S * sensor_rate_hz)
         self._health = sensor.health()
-        self._sensor_fd = -1
         self._sensor_error: Exception | None = None
-        self._taken = 0
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator = Operator.NONE
         self._paused = False
         self._launcher, self._recorder = Silence(), Silence()
-        self._consumed = 0
-        self._last_tick_ns = 0
+        self._consumed = self._taken = self._last_tick_ns = self._asleep_ns = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
@@ -296,7 +293,7 @@ def ft_input(
             FtReading(s.received_ns, s.seq, (s.value.fx, s.value.fy, s.value.fz), (s.value.mx, s.value.my, s.value.mz))
             for s in readings
         ),
-        int(health.state),
+        link_number(health.state),
         counters.get("packets_ok", taken),
         counters.get("crc_fail", 0),
         counters.get("junk_bytes", 0),

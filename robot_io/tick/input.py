@@ -18,6 +18,11 @@ class Operator(IntEnum):
     RESUME = 2
 
 
+def link_number(state: int) -> int:
+    """Return a driver's `LinkState` as a record holds it: one that is none of a driver's is that of a lost link."""
+    return int(state) if 0 <= state < 2**8 else int(LinkState.LOST)
+
+
 class FtReading(msgspec.Struct, frozen=True, gc=False):
     """One packet of the force-torque sensor: N, N*m in the SENSOR frame, bias still in it."""
 
