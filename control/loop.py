@@ -96,6 +96,7 @@ class ControlLoop:
         watch: Watch,
         operator_fd: int,
         on_status: Callable[[TickInput, TickState, TickOutput], None],
+        law_ns: Callable[[], int] = lambda: 0,
         clock: ClockNs = monotonic_ns,
         asleep: Callable[[], int | None] = asleep_ns,
     ) -> None:
@@ -106,8 +107,7 @@ class ControlLoop:
         self._sensor, self._arm, self._base, self._ring, self._watch = sensor, arm, base, ring, watch
         self._operator_fd = operator_fd
         self._on_status = on_status
-        self._clock = clock
-        self._read_asleep_ns = asleep
+        self._law_ns, self._clock, self._read_asleep_ns = law_ns, clock, asleep
         self._asleep_ns = 0
         self._loop = EventLoop()
         self._timer: Timer | None = None
@@ -275,6 +275,7 @@ class ControlLoop:
                 self._launcher.so_far_ns(now_ns),
                 self._recorder.so_far_ns(now_ns),
                 self._asleep_ns,
+                self._law_ns(),
             ),
             ft_input(readings, self._health, self._taken),
             self._arm_record,

@@ -21,13 +21,14 @@ from robot_io.messages import Vector6
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.renames import name_today, use_todays_names
 from robot_io.rig.task import FaultsConfig, GoalConfig, PathConfig, SlidersConfig, WorkspaceConfig
 from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
-from robot_io.rig.types import InBase, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
+from robot_io.rig.types import InBase, Joints, LawFacts, Level, Matrix3, NonNegative, Options, Positive, Table
 from robot_io.rig.world import WorldConfig
 
-RIGS_DIR = Path(__file__).parent
+RIGS_DIR, _LAW = Path(__file__).parent, ("control", "law")
 
 
 class LoopConfig(Table, frozen=True):
@@ -122,7 +123,8 @@ class FramesConfig(Table, frozen=True):
 class ControlConfig(Table, frozen=True):
     """Gains and speeds of the push."""
 
-    controller: Literal["force", "open-loop"] = "force"
+    law: str = "force"
+    """`force` (the paper's), `force-integral`, `open-loop`, `line`, or your own: `module:Class` (docs/own-law.md)."""
     k_f: Annotated[float, Meta(ge=0, le=2)] = 0.3
     k_y_rad_per_m: Annotated[float, Meta(ge=0, le=2)] = 0.2
     push_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.1
@@ -151,6 +153,10 @@ class ControlConfig(Table, frozen=True):
     """... and the run ends after this long at rest, unless the operator resumes."""
     retreat_m: Annotated[float, Meta(ge=0, le=0.2)] = 0.05
     """How far the base backs off after the push, so that the sensor can be checked out of contact (0: not at all)."""
+    law_settings: Options = msgspec.field(default_factory=dict)
+    """What the law adds to `[control]` (docs/laws.md). A law given on the command line begins with its own defaults."""
+    law_facts: LawFacts = LawFacts()
+    """What a law of your own declares, filled in at the start of a run: not for you to write."""
 
 
 class LimitsConfig(Table, frozen=True):
@@ -168,6 +174,8 @@ class LimitsConfig(Table, frozen=True):
     max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
     max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
     """Turned away this far from its heading at the start, the base stops (F44)."""
+    law_ms: Annotated[float, Meta(gt=0, le=5)] = 1.0
+    """A step of a law of your own may take this long (F57-slow)."""
     drift_hold_rad: Positive = 0.005
     """Drift of an arm joint at which the base holds ..."""
     drift_stop_rad: Positive = 0.01
@@ -238,8 +246,13 @@ def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = ()) -
 
 
 def _lay_over(data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str]) -> None:
-    for setting in overrides:
-        key, value = toml_text.parse_setting(setting)
+    settings = [(name_today(key, "--set"), value) for key, value in map(toml_text.parse_setting, overrides)]
+    # The law first: another one than the file's begins with its own defaults, which further settings may change.
+    for key, value in sorted(settings, key=lambda item: item[0] != _LAW):
+        control = data.get("control")
+        if key == _LAW and isinstance(control, dict) and control.get("law", "force") != value:
+            control.pop("law_settings", None)
+            control.pop("law_facts", None)
         toml_text.put(data, key, value)
         origins[key] = f"--set {'.'.join(key)}"
 
@@ -276,6 +289,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot read it: {error}", where=str(path)) from None
     data, origins = toml_text.parse(text, str(path))
+    use_todays_names(data, origins, str(path))
     if "extends" not in data:
         return data, origins
     base = data.pop("extends")

@@ -32,3 +32,14 @@ Options = dict[str, _Plain | list[_Plain]]
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of a rig file: frozen, unknown keys refused."""
+
+
+class LawFacts(Table, frozen=True):
+    """What a law of one's own declares: empty for a shipped law."""
+
+    name: str = ""
+    """What it is called in reports."""
+    source_sha256: str = ""
+    """Of the file it is in, hexadecimal."""
+    state: tuple[str, ...] = ()
+    """The name of each number of its state, in the order in which the log has them."""

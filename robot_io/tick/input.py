@@ -56,6 +56,8 @@ class HostInput(msgspec.Struct, frozen=True, gc=False):
     """How long the recorder has taken nothing of what waited for it."""
     asleep_ns: int = 0
     """CLOCK_BOOTTIME minus CLOCK_MONOTONIC: grows only while this machine is suspended (0 at level sim)."""
+    law_ns: int = 0
+    """How long the law's last step took, told once; 0 for a shipped law, and at level sim within the limit."""
 
 
 class TickInput(msgspec.Struct, frozen=True, gc=False):

@@ -8,13 +8,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from control.laws.shipped import is_shipped
 from robot_io.error_report import printable, say_json, tell
 from robot_io.errors import ReplayDiffers
 from robot_io.log.log_format import FORMAT_FACT
 from robot_io.rig.config import rig_from_toml, rig_to_toml
+from robot_io.rig.toml import parse_setting
 from tools.places.find_log import find_log
 from tools.replay.difference import Difference
 from tools.replay.fold import ReplayResult, replay
+from tools.replay.law import law_of
 from tools.replay.verified_log import VerifiedLog
 from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
 from tools.run.facts.run_facts import code_and_machine
@@ -31,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--what-if", action="append", default=[], metavar="KEY=VALUE", help="re-run the same inputs with other settings"
     )
     parser.add_argument(
+        "--law", default="", metavar="MODULE:CLASS", help="the log's law, if it does not come with the program"
+    )
+    parser.add_argument(
         "--tolerance", type=number(0, 1e6), metavar="X", help="accept differences up to X (log from another machine)"
     )
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
@@ -41,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     path = find_log(args.log)
     if args.what_if:
         return what_if(path, args)
-    result = replay(path, tolerance=args.tolerance)
+    result = replay(path, tolerance=args.tolerance, law=args.law)
     for line in lines(result):
         (tell if args.json else print)(printable(line))
     if args.json:
@@ -129,7 +135,8 @@ def what_if(path: Path, args: argparse.Namespace) -> int:
     log = VerifiedLog(path)
     log.require_config()
     other = rig_from_toml(rig_to_toml(log.usable_rig()), overrides=args.what_if)
-    core = TickCore.of(other, in_contact=log.in_contact)
+    law, _ = law_of(path, other.control, args.law or _law_of_what_if(args.what_if))
+    core = TickCore.of(other, in_contact=log.in_contact, law=law)
     state = None
     count = changed = 0
     worst = 0.0
@@ -159,6 +166,12 @@ def what_if(path: Path, args: argparse.Namespace) -> int:
             }
         )
     return 0
+
+
+def _law_of_what_if(settings: list[str]) -> str:
+    """Return the law of one's own that `--what-if control.law=...` names, as `--law` would; "" without one."""
+    named = [str(value) for key, value in map(parse_setting, settings) if key == ("control", "law")]
+    return named[-1] if named and not is_shipped(named[-1]) else ""
 
 
 def _plain(found: Difference | None) -> dict[str, Any] | None:

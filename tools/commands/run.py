@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 from typing import Any
 
+from control.laws.shipped import SHIPPED, is_shipped
 from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
 from robot_io.tick import TickInput, TickOutput, TickState
 from tools.commands.run_outputs import save_tare, write_report, write_summary
-from tools.places import run_dir, saved_tare
+from tools.laws import own_law
+from tools.places import law_proof, run_dir, saved_tare
 from tools.places.device_locks import DeviceLocks
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
@@ -40,8 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--distance-m", type=number(0.001, 1000), metavar="M", help="how far to push, from first contact"
     )
     parser.add_argument(
-        "--controller", choices=("force", "open-loop"), help="force (the pushing law) or open-loop (straight ahead)"
+        "--law", metavar="LAW", help=f"{', '.join(SHIPPED)}, or your own as module:Class (default: the rig's)"
     )
+    parser.add_argument("--controller", metavar="LAW", help="earlier name of --law")
     parser.add_argument("--seed", type=SEED, metavar="SEED", default=0, help="seed of the simulated world (0)")
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
@@ -65,6 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--move-robot", action="store_true", help="needed before any real device is opened")
     parser.add_argument(
         "--drive-blind", action="store_true", help="let a real base move although its sensor or arm is emulated"
+    )
+    parser.add_argument(
+        "--untested-law", action="store_true", help="let a law of your own move a real robot without an emulated run"
     )
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
@@ -126,7 +133,10 @@ def overrides(args: argparse.Namespace) -> list[str]:
     if args.distance_m is not None:
         found.append(f"control.distance_m={args.distance_m!r}")
     if args.controller is not None:
-        found.append(f"control.controller={args.controller}")
+        tell("--controller is called --law now")
+        found.append(f"control.law={json.dumps(args.controller)}")
+    if args.law is not None:
+        found.append(f"control.law={json.dumps(args.law)}")
     if args.start_in_contact:
         found.append("world.start.gap_m=0.0")
     return found
@@ -141,12 +151,33 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
             where="push run",
             do="Clear the floor, hold the e-stop, and add --move-robot",
         )
+    if hardware and args.move_robot and not args.untested_law:
+        check_law(rig)
     blind = blind_words(rig)
     if blind and not (args.drive_blind or args.check):
         raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
     check_room(rig, args.seed)
+
+
+def check_law(rig: RigConfig) -> None:
+    """Raise UsageError for a law of one's own that has not passed an emulated run with this very source."""
+    if not is_shipped(rig.control.law) and not law_proof.has_passed(rig.control.law_facts):
+        raise UsageError(
+            f"the law `{rig.control.law}` has not yet passed an emulated run with its present source",
+            where="push run",
+            do=f"Run it emulated first (push run emulated --law {rig.control.law}), or add --untested-law",
+        )
+
+
+def note_passed_law(rig: RigConfig, summary: dict[str, Any]) -> None:
+    """Note for later that a law of one's own has passed, if every device was emulated."""
+    if summary["exit_code"] == 0 and summary["level"] == "emulated" and not is_shipped(rig.control.law):
+        try:
+            law_proof.save(rig.control.law_facts, rig.name, summary["log"])
+        except (OSError, PushError) as error:
+            summary["notes"].append(f"that this law has passed could not be noted: {error}")
 
 
 def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
@@ -189,6 +220,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
+    note_passed_law(rig, summary)
     return with_injected(summary, launcher.injected(figures))
 
 
@@ -196,10 +228,11 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
     """Run level sim in this process and return its summary."""
     from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
 
+    law = own_law(rig.control, folder_of(args.rig))
     text = run_dir.write_config(out, rig)
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
     try:
-        one = Lockstep(rig, args.seed, log, saved=saved)
+        one = Lockstep(rig, args.seed, log, saved=saved, law=law)
     except PushError:  # an impossible world: nothing has started
         log.abandon()
         run_dir.discard(out)

@@ -21,6 +21,7 @@ from typing import Any
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.mcap.walk import Grown
 from safety.faults import FAULTS
+from tools.laws import law_label
 from tools.places.atomic_file import write_atomically
 from tools.report import run_summary, run_verdict
 from tools.report.growing_log import GrowingLog
@@ -96,10 +97,9 @@ def page(run: RunData, summary: dict[str, Any], pngs: dict[str, bytes], mark: st
     """Return the page. Everything that comes from the log or the summary is escaped."""
     verdict = run_verdict.verdict(run, summary)
     rig = run.rig
-    law = "force feedback" if rig.control.controller == "force" else "open loop"
     level = run.facts.get("level", "unknown level")
     name = rig.name if rig.name == level else f"{rig.name} ({level})"
-    subtitle = f"{name}, {law}, seed {run.facts.get('seed', '-')}, {run.log.name}"
+    subtitle = f"{name}, {law_label(rig)}, seed {run.facts.get('seed', '-')}, {run.log.name}"
     baseline = run_summary.baseline_of(rig)
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         run_mark=mark,

@@ -11,6 +11,7 @@ import numpy as np
 
 from robot_io.errors import ContactLost
 from robot_io.tick import Phase
+from tools.laws import law_label
 from tools.report.bounded_series import Floats
 from tools.report.run_data import RunData
 from tools.report.style import BLUE, GREEN, GREY, INK, PURPLE, VERMILLION, WIDTH_IN, new_figure, no_data
@@ -143,7 +144,7 @@ def outline(run: RunData) -> list[tuple[float, float]] | None:
 
 
 def _title(run: RunData) -> str:
-    law = "force feedback" if run.rig.control.controller == "force" else "open loop, straight ahead"
+    law = law_label(run.rig)
     if run.last is None:
         return law
     control = run.last.after.control

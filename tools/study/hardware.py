@@ -90,7 +90,7 @@ def rig_of(item: HardwareItem) -> RigConfig:
     settings = [f"world.slider.{setting}" for setting in SLIDERS[item.slider]]
     settings += [f"world.floor.{setting}" for setting in FLOOR]
     settings += [
-        f"control.controller={item.controller}",
+        f"control.law={item.controller}",
         f"control.k_f={item.k_f!r}",
         f"control.k_y_rad_per_m={item.k_y_rad_per_m!r}",
         f"control.distance_m={DISTANCE_M!r}",

@@ -13,6 +13,9 @@ from sim_backend.physics.slider import Circle, Rectangle
 from sim_backend.world.scene import slider_model
 from tools.rig import devices_at
 
+GAINS_MATTER = ("force", "force-integral")
+"""The laws whose gains the limits are for."""
+
 
 def gain_warning(rig: RigConfig) -> str | None:
     """Return a warning if a rig's gains exceed 0.7 of the limit for a slider it may push, else None.
@@ -20,7 +23,7 @@ def gain_warning(rig: RigConfig) -> str | None:
     Raises ConfigError if the simulated slider is not possible (it would tip over).
     """
     control, bodies = rig.control, _bodies(rig)
-    if control.controller != "force" or not bodies:
+    if control.law not in GAINS_MATTER or not bodies:
         return None
     highest = limit(bodies, control.k_f)
     if control.k_y_rad_per_m <= WARN_SHARE * highest:

@@ -108,7 +108,7 @@ def test_run_warns_of_gains_with_little_margin_only():
     assert paper is not None
     assert "0.1/0.3" in paper
     assert "\n" not in paper
-    assert gain_warning(load_rig("sim", ["control.controller=open-loop", "control.k_y_rad_per_m=2"])) is None
+    assert gain_warning(load_rig("sim", ["control.law=open-loop", "control.k_y_rad_per_m=2"])) is None
     assert gain_warning(load_rig("sim", ["world.slider.shape=circle", "control.k_y_rad_per_m=1.5"])) is not None
     assert all(gain_warning(load_rig(name)) is None for name in ("emulated", "barrel", "thing"))
     assert gain_warning(load_rig("paper-gains")) is not None
