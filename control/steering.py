@@ -38,10 +38,10 @@ def steer(
     said = settings.law.step(state.law_state, seen)
     if said.error:
         return replace(state, theta_f=theta_f, law_error=said.error, speed=0.0)
-    theta_p = said.theta_p_rad
-    if BACKWARD_RAD < abs(theta_p) < math.inf:
+    theta_p = said.theta_p_rad if math.isfinite(said.theta_p_rad) else math.nan
+    if abs(theta_p) > BACKWARD_RAD:
         # Beyond 90 degrees the law would pull: the direction is kept and safety counts the ticks (F56).
         backward = state.backward_ticks + 1
         return replace(state, theta_f=theta_f, law_state=said.state, speed=speed, backward_ticks=backward)
-    # Not a number, or not finite: F58 at once.
+    # Not a number: F58 at once.
     return replace(state, theta_f=theta_f, law_state=said.state, theta_p=theta_p, speed=speed, backward_ticks=0)

@@ -68,7 +68,8 @@ def reference() -> str:
             note = notes.get((table.__name__, field.name), "").replace("\n", " ").replace("|", "\\|")
             parts.append(f"| `{field.name}` | {_type_text(hints[field.name])} | {_default(field)} | {note} |")
     parts.append(RENAMES)
-    parts += [f"- {advice(key)}." for key in (*(one.old for one in RENAMED), *(one.key for one in RETIRED))]
+    parts += [f"- {advice(one.old)}{', and still read' if one.still_read else ''}." for one in RENAMED]
+    parts += [f"- {advice(one.key)}." for one in RETIRED]
     return "\n".join(parts) + "\n"
 
 
@@ -76,7 +77,7 @@ def _tables(table: type[msgspec.Struct], prefix: str) -> list[tuple[str, type[ms
     found = [(prefix, table)]
     hints = get_type_hints(table)
     for field in msgspec.structs.fields(table):
-        if _is_table(hints[field.name]) and field.name != "declared":  # written by the program
+        if _is_table(hints[field.name]) and field.name not in ("declared", "law_facts"):  # written by the program
             found += _tables(hints[field.name], f"{prefix}.{field.name}" if prefix else field.name)
     return found
 
