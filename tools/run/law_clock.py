@@ -1,7 +1,7 @@
 """Measures how long the steps of a law of one's own take: the next tick's input says so, and safety judges it.
 
-A busy machine must not make a law slow: where another process took the processor during a step, only the law's own
-processor time counts, and the garbage collector of this process does not run then.
+A busy machine must not make a law slow: where another process took the processor during a step that did not wait by
+itself, only the law's own processor time counts, and the garbage collector of this process does not run then.
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ class LawClock:
         """Return what the law says."""
         collecting = gc.isenabled()
         gc.disable()
-        preempted = resource.getrusage(resource.RUSAGE_THREAD).ru_nivcsw
+        before = resource.getrusage(resource.RUSAGE_THREAD)
         own_ns, began_ns = time.thread_time_ns(), time.monotonic_ns()
         try:
             return self._law.step(state, seen)
         finally:
             took_ns, own_ns = time.monotonic_ns() - began_ns, time.thread_time_ns() - own_ns
-            if resource.getrusage(resource.RUSAGE_THREAD).ru_nivcsw != preempted:
-                took_ns = own_ns
+            after = resource.getrusage(resource.RUSAGE_THREAD)
+            if after.ru_nvcsw == before.ru_nvcsw and after.ru_nivcsw != before.ru_nivcsw:
+                took_ns = own_ns  # it did not wait, it was made to
             self._step_ns = max(took_ns, 1)
             if collecting:
                 gc.enable()
