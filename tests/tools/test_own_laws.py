@@ -179,12 +179,12 @@ def test_another_law_on_the_command_line_begins_with_its_own_defaults(tmp_path):
     rig = tmp_path / "mine.toml"
     table = "[control.law_settings]\nk_i_rad_per_m2 = 0.07\n"
     rig.write_text(f'extends = "sim"\n[control]\nlaw = "force-integral"\n{table}', encoding="utf-8")
-    full = {"k_i_rad_per_m2": 0.07, "max_integral_rad": 0.5}
+    full = {"k_i_rad_per_m2": 0.07, "max_integral_rad": 0.5, "fade_m": 6.0}
     assert resolve_rig(rig).control.law_settings == full
     assert resolve_rig(rig, ["control.law=force-integral"]).control.law_settings == full
     assert resolve_rig(rig, ["control.law=force"]).control.law_settings == {}
     one = ["control.law_settings.k_i_rad_per_m2=0.03", "control.law=force-integral"]
-    assert resolve_rig("sim", one).control.law_settings == {"k_i_rad_per_m2": 0.03, "max_integral_rad": 0.5}
+    assert resolve_rig("sim", one).control.law_settings == full | {"k_i_rad_per_m2": 0.03}
 
 
 # --- the time of a step ----------------------------------------------------------------------------------------

@@ -174,5 +174,5 @@ def check_flags(dt_s: float | None, open_loop: bool) -> None:
     """Raise UsageError for flags that only other studies accept."""
     if dt_s is not None or open_loop:
         raise UsageError(
-            "`push sweep hardware` has its own step and both controllers", do="Leave out --dt and --open-loop"
+            "`push sweep hardware` has its own step and both laws", do="Leave out --dt, --law and --open-loop"
         )
