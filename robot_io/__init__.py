@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = ["Ft300", "Ridgeback", "Ur10", "errors", "messages", "open_device"]
 
-__getattr__ = exports(
+__getattr__, __dir__ = exports(
     __name__,
     {
         "Ft300": "ft300.driver",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable
 from typing import Any
 
 
-def exports(package: str, modules: dict[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` (PEP 562) of `package`; `modules` says which of its modules defines each name.
+def exports(package: str, modules: dict[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Return `__getattr__` and `__dir__` (PEP 562) of `package`; `modules` says which of its modules defines each name.
 
     An empty one: the name is that of a module.
     """
@@ -20,4 +21,7 @@ def exports(package: str, modules: dict[str, str]) -> Callable[[str], Any]:
             return importlib.import_module(f"{package}.{name}")
         return getattr(importlib.import_module(f"{package}.{modules[name]}"), name)
 
-    return find
+    def names() -> list[str]:
+        return sorted({*vars(sys.modules[package]), *modules})
+
+    return find, names

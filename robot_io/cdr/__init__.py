@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CdrType", "type_from_schema"]
 
-__getattr__ = exports(
+__getattr__, __dir__ = exports(
     __name__,
     {
         "CdrType": "cdr_type",

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Ft300", "Ft300Reading"]
 
-__getattr__ = exports(
+__getattr__, __dir__ = exports(
     __name__,
     {
         "Ft300": "driver",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["EventLoop", "GateFrame", "GateLink", "Ring", "SharedRecord", "StatusPipe", "StatusReader"]
 
-__getattr__ = exports(
+__getattr__, __dir__ = exports(
     __name__,
     {
         "EventLoop": "event_loop",

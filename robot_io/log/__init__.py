@@ -12,4 +12,4 @@ if TYPE_CHECKING:
 
 __all__ = ["CHANNELS", "Kind", "recover"]
 
-__getattr__ = exports(__name__, {"CHANNELS": "channels", "Kind": "channels", "recover": "recovery"})
+__getattr__, __dir__ = exports(__name__, {"CHANNELS": "channels", "Kind": "channels", "recover": "recovery"})

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LogMessage", "LogSummary", "McapLog", "read_log", "read_summary"]
 
-__getattr__ = exports(
+__getattr__, __dir__ = exports(
     __name__,
     {
         "LogMessage": "read",

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Ridgeback"]
 
-__getattr__ = exports(
+__getattr__, __dir__ = exports(
     __name__,
     {
         "Ridgeback": "driver",

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RigConfig", "TopicsConfig", "load_rig", "rig_from_toml", "rig_to_toml", "shipped_rigs"]
 
-__getattr__ = exports(
+__getattr__, __dir__ = exports(
     __name__,
     {
         "RigConfig": "config",

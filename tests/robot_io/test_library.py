@@ -151,4 +151,12 @@ def test_names_that_are_not_there_are_an_attribute_error():
 
     with pytest.raises(AttributeError, match="has no attribute 'Ft400'"):
         _ = robot_io.Ft400
-    assert set(robot_io.__all__) <= {*dir(robot_io), "Ft300", "Ridgeback", "Ur10", "open_device"}
+
+
+def test_every_public_name_is_offered_before_it_is_imported():
+    # What an interactive session completes after `robot_io.` and `robot_io.ft300.`
+    code = "import robot_io, robot_io.ft300; print(*dir(robot_io), *dir(robot_io.ft300))"
+    said = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60, check=True
+    )
+    assert {"Ft300", "Ridgeback", "Ur10", "errors", "messages", "open_device"} <= set(said.stdout.split())
