@@ -42,9 +42,9 @@ def _integral_warning(control: ControlConfig, bodies: list[PushedBody]) -> str |
     if k_i <= WARN_SHARE * highest:
         return None
     return (
-        f"the integral's k_i {k_i:g} rad/m^2 may make the push swing: for the sliders of this rig at these gains the limit "
-        f"is {highest:.2g}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune --law force-integral` finds "
-        "a better one"
+        f"the integral's k_i {k_i:g} rad/m^2 may make the push swing: for the sliders of this rig at these gains the "
+        f"limit is {highest:.2g}, and beyond {WARN_SHARE:g} of it there is little margin; "
+        "`push tune --law force-integral` finds a better one"
     )
 
 
