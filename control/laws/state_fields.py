@@ -40,6 +40,8 @@ class StateFields:
         """Return a state as numbers. Raises TypeError unless it is one of this class, with what its fields say."""
         if type(state) is not self._kind:
             raise TypeError(f"its state is {_a(state)}, not {self._kind.__name__}")
+        if self._empty is not None:
+            return ()
         packed: list[float] = []
         for field, value in zip(self._fields, astuple(state), strict=True):
             items = value if field.is_tuple else (value,)
