@@ -37,6 +37,7 @@ from robot_io.tick import (
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
+PAUSE, GO_ON = b"PC"
 LOG_LOST = b"L"[0]
 """The launcher reports that the recorder can no longer write: treated as if it were gone."""
 BEAT = b"H"[0]
@@ -105,22 +106,20 @@ class ControlLoop:
         self._period_ns = round(1e9 / rate_hz)
         self._status_every = max(1, round(rate_hz / 5.0))
         self._sensor, self._arm, self._base, self._ring, self._watch = sensor, arm, base, ring, watch
-        self._operator_fd = operator_fd
-        self._on_status = on_status
+        self._operator_fd, self._on_status = operator_fd, on_status
         self._law_ns, self._clock, self._read_asleep_ns = law_ns, clock, asleep
-        self._asleep_ns = 0
         self._loop = EventLoop()
         self._timer: Timer | None = None
-        self._tick = -1
+        self._tick, self._asleep_ns = -1, 0
         self._most_readings = round(FLOOD_S * sensor_rate_hz)
         self._health = sensor.health()
         self._sensor_fd = -1
         self._sensor_error: Exception | None = None
         self._taken = 0
         self._readings: list[Stamped[SensorWrench]] = []
-        self._operator = Operator.NONE
-        self._launcher, self._recorder = Silence(), Silence()
-        self._consumed = 0
+        self._operator, self._paused = Operator.NONE, False
+        self._launcher, self._recorder, self._consumed = Silence(), Silence(), 0
+        self._last_tick_ns = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
@@ -184,14 +183,12 @@ class ControlLoop:
             self._operator_fd = -1
             typed = b"S"
         for key in typed:
-            if key == BEAT:
-                continue
-            if key == LOG_LOST:
+            if key in (PAUSE, GO_ON):
+                self._paused = key == PAUSE
+            elif key == LOG_LOST:
                 self._watch.gone.add("recorder")
-                continue
-            event = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
-            if self._operator != Operator.STOP:
-                self._operator = event
+            elif key != BEAT and self._operator != Operator.STOP:
+                self._operator = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
 
     def _on_gone(self, name: str, _events: int) -> None:
         self._watch.gone.add(name)
@@ -214,7 +211,8 @@ class ControlLoop:
         except Exception as error:  # top level of the loop: whatever failed, the base gets zero and the log records it
             self._give_up(inp, error)
         self.last_ns = now_ns
-        self.timing.note(paced.late_ns, paced.skipped, self._clock() - now_ns)
+        self._last_tick_ns = self._clock() - now_ns
+        self.timing.note(paced.late_ns, paced.skipped, self._last_tick_ns)
 
     def _one_tick(self, inp: TickInput) -> None:
         after, output = self._fold(self._state, inp)
@@ -275,11 +273,13 @@ class ControlLoop:
                 self._launcher.so_far_ns(now_ns),
                 self._recorder.so_far_ns(now_ns),
                 self._asleep_ns,
+                self._last_tick_ns,
                 self._law_ns(),
             ),
             ft_input(readings, self._health, self._taken),
             self._arm_record,
             self._base.read(),
+            self._paused,
         )
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from robot_io.errors import ConfigError
-from robot_io.rig.config import RigConfig, load_rig, shipped_rigs
+from robot_io.rig.config import RigConfig, load_rig
 from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.fault_words import parse_fault
+from robot_io.rig.files import shipped_rigs
 from robot_io.rig.types import Matrix3
 from tools.kinds import is_shipped, query_kinds
 from tools.laws import with_law

@@ -25,6 +25,7 @@ class AppliedLaw:
     """A law that never raises. Raises TypeError when its State cannot be kept, and whatever its `initial` raises."""
 
     def __init__(self, law: Law) -> None:
+        self._kind = type(law)
         self._step = law.step
         self._fields = StateFields(law.State)
         self.initial = self._fields.pack(law.initial())
@@ -33,6 +34,13 @@ class AppliedLaw:
         """The name of each number of the state."""
         self.returns_to_path: bool = getattr(law, "returns_to_path", True)
         """Whether the ball turns back over the path while the contact is lost."""
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether both are of one class; what they were built with is in the settings of control."""
+        return isinstance(other, AppliedLaw) and other._kind is self._kind
+
+    def __hash__(self) -> int:
+        raise TypeError("it is compared, never looked up")
 
     def step(self, packed: tuple[float, ...], seen: Seen) -> LawResult:
         """Return what the law says; `packed` is the state, empty before the first step."""

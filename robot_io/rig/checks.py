@@ -15,7 +15,8 @@ import msgspec
 
 from robot_io.errors import ConfigError
 from robot_io.rig.renames import advice
-from robot_io.rig.toml import KeyPath, Origins
+from robot_io.rig.toml import KeyPath, Origins, origin_of
+from robot_io.rig.types import table_of
 
 ALIKE = 0.75
 """How like a key elsewhere has to be (difflib's ratio) to be meant rather than one of the same table."""
@@ -33,7 +34,7 @@ def build(kind: type[T], data: Mapping[str, Any], origins: Origins, name: str) -
     unknown key, missing key, wrong type, value out of range and number that is not finite.
     """
     mistakes: Mistakes = []
-    reader = _Reader(kind, lambda path: _origin(path, origins, name), mistakes)
+    reader = _Reader(kind, lambda path: origin_of(path, origins, name), mistakes)
     built = reader.read(kind, data, ())
     if mistakes:
         if len(mistakes) == 1:
@@ -42,14 +43,6 @@ def build(kind: type[T], data: Mapping[str, Any], origins: Origins, name: str) -
         listed = "\n".join(f"  {where}: {what}" for where, what in mistakes)
         raise ConfigError(f"{len(mistakes)} mistakes\n{listed}", where=name)
     return msgspec.convert(built, kind)
-
-
-def _origin(path: KeyPath, origins: Origins, name: str) -> str:
-    """Return where `path`, or else the nearest table around it, was written."""
-    for depth in range(len(path), 0, -1):
-        if path[:depth] in origins:
-            return origins[path[:depth]]
-    return name
 
 
 class _Reader:
@@ -68,9 +61,9 @@ class _Reader:
                 dotted = ".".join(here)
                 what = advice(dotted) or f"unknown key `{dotted}`{self._meant(here, value, list(fields))}"
                 self._note(here, what)
-            elif _is_table(fields[key].type):
+            elif table := table_of(fields[key].type):
                 if isinstance(value, Mapping):
-                    built[key] = self.read(fields[key].type, value, here)
+                    built[key] = self.read(table, value, here)
                 else:
                     self._note(here, f"`{'.'.join(here)}` is a table, not a value")
             elif problem := _problem(fields[key].type, value):
@@ -106,14 +99,10 @@ def _names(kind: type[msgspec.Struct], path: KeyPath = ()) -> Iterator[KeyPath]:
     """Yield the path of every value."""
     for field in msgspec.structs.fields(kind):
         here = (*path, field.name)
-        if _is_table(field.type):
-            yield from _names(field.type, here)
+        if table := table_of(field.type):
+            yield from _names(table, here)
         else:
             yield here
-
-
-def _is_table(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
 
 
 def _problem(kind: Any, value: Any) -> str:
@@ -134,6 +123,8 @@ def _choices(kind: Any) -> tuple[Any, ...]:
 
 
 def _finite(value: Any) -> bool:
+    if isinstance(value, msgspec.Struct):
+        value = msgspec.structs.astuple(value)
     if isinstance(value, tuple):
         return all(_finite(item) for item in value)
     return not isinstance(value, float) or math.isfinite(value)

@@ -1,13 +1,12 @@
 """The rig file: TOML to typed, frozen settings with the unit in every key and the range in every type.
 
 `load_rig` reads a shipped name (`sim`, `emulated`, `thing`, ...) or a path. All mistakes of a file are reported
-at once, each with its line; an unknown key names the nearest known one. A file may say `extends = "emulated"`
-and then holds only what differs.
+at once, each with its line; an unknown key names the nearest known one. A file may extend a rig and include files
+(`robot_io.rig.files`).
 """
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,19 +15,19 @@ import msgspec
 from msgspec import Meta
 
 from robot_io.driver import SensorFacts
-from robot_io.errors import ConfigError
 from robot_io.messages import Vector6
+from robot_io.rig import files
 from robot_io.rig import toml as toml_text
+from robot_io.rig.calibration import CalibrationConfig
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
-from robot_io.rig.renames import name_today, use_todays_names
+from robot_io.rig.renames import name_today
 from robot_io.rig.task import FaultsConfig, GoalConfig, PathConfig, SlidersConfig, WorkspaceConfig
-from robot_io.rig.toml import Origins
 from robot_io.rig.topics import TopicsConfig
 from robot_io.rig.types import InBase, Joints, LawFacts, Level, Matrix3, NonNegative, Options, Positive, Table
 from robot_io.rig.world import WorldConfig
 
-RIGS_DIR, _LAW = Path(__file__).parent, ("control", "law")
+_LAW = ("control", "law")
 
 
 class LoopConfig(Table, frozen=True):
@@ -198,6 +197,7 @@ class RigConfig(Table, frozen=True):
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
     goal: GoalConfig = GoalConfig()
+    calibration: CalibrationConfig = CalibrationConfig()
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()
 
@@ -213,21 +213,27 @@ class RigConfig(Table, frozen=True):
         return force, force, force, torque, torque, torque
 
 
-def shipped_rigs() -> list[str]:
-    """Return the names of the rigs that come with the program."""
-    return sorted(path.stem for path in RIGS_DIR.glob("*.toml"))
-
-
 def load_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
     """Load a shipped rig by name, or a file by path, with `key=value` settings laid over it.
 
     A value of `overrides` is TOML (`control.k_f=0.1`, `path.direction_deg=-30`); what is not TOML is a string.
     Raises ConfigError (no such rig, unknown key, value out of range, not finite) and UsageError (bad override).
     """
-    path = _find(name_or_path)
-    data, origins = _read(path, ())
+    path = files.find(name_or_path)
+    data, origins = files.read(path)
     _lay_over(data, origins, overrides)
     return build(RigConfig, data, origins, str(path))
+
+
+def origins_of(name_or_path: str | Path, overrides: Sequence[str] = ()) -> toml_text.Origins:
+    """Return where each value of a rig was written: `file:line`, or `--set key`; none for a default.
+
+    Raises as `load_rig`.
+    """
+    path = files.find(name_or_path)
+    data, origins = files.read(path)
+    _lay_over(data, origins, overrides)
+    return {key: toml_text.origin_of(key, origins, str(path)) for key in files.leaves(data)}
 
 
 def rig_to_toml(rig: RigConfig) -> str:
@@ -235,66 +241,26 @@ def rig_to_toml(rig: RigConfig) -> str:
     return toml_text.emit(msgspec.to_builtins(rig))
 
 
-def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = ()) -> RigConfig:
-    """Read what `rig_to_toml` wrote, with `key=value` settings laid over it.
+def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = (), *, option: str = "--set") -> RigConfig:
+    """Read what `rig_to_toml` wrote, with `key=value` settings of a command's `option` laid over it.
 
     Raises ConfigError (with `name` as its place) when it is anything else, and as `load_rig` for the settings.
     """
     data, origins = toml_text.parse(text, name)
-    _lay_over(data, origins, overrides)
+    _lay_over(data, origins, overrides, option)
     return build(RigConfig, data, origins, name)
 
 
-def _lay_over(data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str]) -> None:
-    settings = [(name_today(key, "--set"), value) for key, value in map(toml_text.parse_setting, overrides)]
+def _lay_over(
+    data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str], option: str = "--set"
+) -> None:
+    parsed = [toml_text.parse_setting(setting, option) for setting in overrides]
+    settings = [(name_today(key, option), value) for key, value in parsed]
     # The law first: another one than the file's begins with its own defaults, which further settings may change.
     for key, value in sorted(settings, key=lambda item: item[0] != _LAW):
         control = data.get("control")
         if key == _LAW and isinstance(control, dict) and control.get("law", "force") != value:
             control.pop("law_settings", None)
             control.pop("law_facts", None)
-        toml_text.put(data, key, value)
-        origins[key] = f"--set {'.'.join(key)}"
-
-
-def _find(name_or_path: str | Path) -> Path:
-    text = str(name_or_path)
-    if text in (shipped := shipped_rigs()):
-        return RIGS_DIR / f"{text}.toml"
-    path = Path(text)
-    if _is_file(path):
-        return path
-    if path.suffix == ".toml" or "/" in text:
-        raise ConfigError("there is no such rig file", where=text)
-    near = difflib.get_close_matches(text, shipped, n=1)
-    hint = f"Did you mean `{near[0]}`? " if near else ""
-    raise ConfigError(
-        f"there is no rig named `{text}`", do=f"{hint}Shipped rigs: {', '.join(shipped)}; or give the path of a file"
-    )
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError as error:  # a folder that is not ours to look into, a name that is too long
-        raise ConfigError(f"cannot read it: {error.strerror}", where=str(path)) from None
-
-
-def _read(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], Origins]:
-    """Return the tables of `path` laid over those of the rig it extends, and where each key was written."""
-    if path.resolve() in seen:
-        raise ConfigError("this rig extends itself", where=str(path))
-    try:
-        text = path.read_text(encoding="utf-8-sig")  # a byte order mark, as some editors write, is not a mistake
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"cannot read it: {error}", where=str(path)) from None
-    data, origins = toml_text.parse(text, str(path))
-    use_todays_names(data, origins, str(path))
-    if "extends" not in data:
-        return data, origins
-    base = data.pop("extends")
-    if not isinstance(base, str):
-        raise ConfigError("`extends` names a rig: a shipped name or a path", where=origins.get(("extends",), str(path)))
-    beside = path.parent / base
-    below, below_origins = _read(beside if _is_file(beside) else _find(base), (*seen, path.resolve()))
-    return toml_text.merge(below, data), below_origins | origins
+        toml_text.put(data, key, value, option)
+        origins[key] = f"{option} {'.'.join(key)}"

@@ -15,13 +15,14 @@ from robot_io.errors import ConfigError, UsageError
 
 KeyPath = tuple[str, ...]
 Origins = dict[KeyPath, str]
-"""Where each key was written: `file:line`, or `--set key`."""
+"""Where each key was written: `file:line`, or the option and the key."""
 
 _MOST_CHARACTERS = 64 << 10
 _MOST_DOTS = 200
 """In a key. `tomllib` takes memory by the square of a key's parts, and the text may come out of a log."""
 _BETWEEN_KEYS = re.compile(r"[,={}\[\]\n\r]")
-_HEADER = re.compile(r"\[([^\[\]]+)\]\s*(?:#.*)?\Z")
+_HEADER = re.compile(r"(?:\[([^\[\]]+)\]|\[\[([^\[\]]+)\]\])\s*(?:#.*)?\Z")
+"""Of a table, or of one in a list of tables."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _KEY = re.compile(r"([A-Za-z0-9_.\-\"' \t]+)=")
 
@@ -45,13 +46,21 @@ def parse(text: str, name: str) -> tuple[dict[str, Any], Origins]:
     return data, _origins(text, name)
 
 
+def origin_of(path: KeyPath, origins: Origins, name: str) -> str:
+    """Return where `path`, or else the nearest table around it, was written; `name` where neither was."""
+    for depth in range(len(path), 0, -1):
+        if path[:depth] in origins:
+            return origins[path[:depth]]
+    return name
+
+
 def _origins(text: str, name: str) -> Origins:
     origins: Origins = {}
     table: KeyPath = ()
     for number, line in enumerate(text.splitlines(), start=1):
         line = line.strip()
         if header := _HEADER.match(line):
-            table = _split(header[1])
+            table = _split(header[1] or header[2])
             origins.setdefault(table, f"{name}:{number}")
         elif key := _KEY.match(line):
             origins.setdefault(table + _split(key[1]), f"{name}:{number}")
@@ -62,13 +71,16 @@ def _split(dotted: str) -> KeyPath:
     return tuple(part.strip(" \t\"'") for part in dotted.split("."))
 
 
-def parse_setting(setting: str) -> tuple[KeyPath, Any]:
-    """Read `a.b=value`: the value is TOML; what is not TOML is a plain string. UsageError without a key or `=`."""
+def parse_setting(setting: str, option: str = "--set") -> tuple[KeyPath, Any]:
+    """Read `a.b=value`: the value is TOML; what is not TOML is a plain string. UsageError without a key or `=`.
+
+    option: where it was given, for the error.
+    """
     key, equals, text = setting.partition("=")
     path = _split(key)
     if not equals or not all(path):
         raise UsageError(
-            f"`{setting}` is not of the form key=value", where="--set", do="For example: --set control.k_f=0.1"
+            f"`{setting}` is not of the form key=value", where=option, do=f"For example: {option} control.k_f=0.1"
         )
     text = text.strip()
     try:
@@ -78,13 +90,13 @@ def parse_setting(setting: str) -> tuple[KeyPath, Any]:
     return path, parsed["value"] if len(parsed) == 1 else text
 
 
-def put(data: dict[str, Any], path: KeyPath, value: Any) -> None:
+def put(data: dict[str, Any], path: KeyPath, value: Any, option: str = "--set") -> None:
     """Set `path` of the nested tables `data` to `value`, making the tables on the way; UsageError through a value."""
     table = data
     for depth, part in enumerate(path[:-1], start=1):
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise UsageError(f"`{'.'.join(path[:depth])}` is a value, not a table", where=f"--set {'.'.join(path)}")
+            raise UsageError(f"`{'.'.join(path[:depth])}` is a value, not a table", where=f"{option} {'.'.join(path)}")
     table[path[-1]] = value
 
 
@@ -101,6 +113,19 @@ def emit(data: Mapping[str, Any]) -> str:
     """Write nested tables as TOML, None left out; floats keep every bit (shortest text that reads back the same)."""
     lines: list[str] = []
     _emit_table(data, (), lines)
+    return "\n".join(lines) + "\n"
+
+
+def with_origins(text: str, origins: Origins) -> str:
+    """Return what `emit` wrote with the origin of each value as a comment; one without has its default."""
+    lines: list[str] = []
+    table: KeyPath = ()
+    for line in text.splitlines():
+        if header := _HEADER.match(line):
+            table = _split(header[1] or header[2])
+        elif key := _KEY.match(line):
+            line += f"  # {origins.get(table + _split(key[1]), 'default')}"
+        lines.append(line)
     return "\n".join(lines) + "\n"
 
 
@@ -132,5 +157,8 @@ def _emit_value(value: Any) -> str:
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case list() | tuple():
             return "[" + ", ".join(_emit_value(item) for item in value) + "]"
+        case Mapping():
+            pairs = (f"{_emit_key(key)} = {_emit_value(item)}" for key, item in value.items() if item is not None)
+            return "{ " + ", ".join(pairs) + " }"
         case _:
             raise TypeError(f"no TOML form for {type(value).__name__}")

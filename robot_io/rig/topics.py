@@ -28,3 +28,5 @@ class TopicsConfig(Table, frozen=True):
     slider_pose: str = ""
     """Where motion capture sees the object; logged, never used for control."""
     slider_pose_type: str = "geometry_msgs/TransformStamped"
+    ball_pose: str = ""
+    """Where motion capture sees a marker on the contact ball, in the same type; for `push calibrate contact`."""

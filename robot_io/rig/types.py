@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from types import NoneType
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 from msgspec import Meta
@@ -14,6 +15,7 @@ NonNegative = Annotated[float, Meta(ge=0)]
 Level = Literal["sim", "emulated", "hardware"]
 Vector2 = tuple[float, float]
 _OnRobot = Annotated[float, Meta(ge=-5, le=5)]
+OnRobot2 = tuple[_OnRobot, _OnRobot]
 InBase = tuple[_OnRobot, _OnRobot, _OnRobot]
 """A point of the robot in m: beyond 5 m it was written in mm."""
 _InRoom = Annotated[float, Meta(ge=-1000, le=1000)]
@@ -43,3 +45,16 @@ class LawFacts(Table, frozen=True):
     """Of the file it is in, hexadecimal."""
     state: tuple[str, ...] = ()
     """The name of each number of its state, in the order in which the log has them."""
+
+
+def row_of(kind: Any) -> type[msgspec.Struct] | None:
+    """Return the table of which a field of this type holds a list; None for any other field."""
+    parts = get_args(kind)
+    return table_of(parts[0]) if get_origin(kind) is tuple and parts[1:] == (Ellipsis,) else None
+
+
+def table_of(kind: Any) -> type[msgspec.Struct] | None:
+    """Return the table that a field of this type holds, also one that may be left out; None for any other field."""
+    present = [part for part in get_args(kind) if part is not NoneType] or [kind]
+    only = present[0] if len(present) == 1 else None
+    return only if isinstance(only, type) and issubclass(only, msgspec.Struct) else None

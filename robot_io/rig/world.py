@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from robot_io.messages import Vector3, Vector6
-from robot_io.rig.types import NonNegative, Positive, Table, Vector2
+from robot_io.rig.types import InBase, NonNegative, OnRobot2, Positive, Table, Vector2
 
 
 class SliderConfig(Table, frozen=True):
@@ -57,7 +57,10 @@ class StartConfig(Table, frozen=True):
 
 
 class SensorModelConfig(Table, frozen=True):
-    """How the simulated FT 300 errs: bias (N, N*m, sensor frame), tool weight and its centre, noise (1 sigma)."""
+    """How the simulated FT 300 errs: bias (N, N*m, sensor frame), tool weight and its centre, noise (1 sigma).
+
+    The weight is felt as the arm holds the sensor, by the published kinematics of a UR10.
+    """
 
     bias: Vector6 = (-20.68, 21.95, -48.70, -0.097, 1.172, -0.321)
     tool_mass_kg: NonNegative = 0.6
@@ -71,6 +74,32 @@ class SensorModelConfig(Table, frozen=True):
     """Latency timer of the emulated USB adapter: 0, 1 or 16 ms."""
 
 
+class TruthConfig(Table, frozen=True):
+    """How far the simulated world is from `[frames]`, to rehearse calibrations: the world is `[frames]` plus this.
+
+    Drivers, law, checks and replay believe `[frames]` (docs/frames-and-signs.md).
+    marker_offset: x (m), y (m), yaw (rad), added to `base_from_marker` number by number.
+    """
+
+    sensor_yaw_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
+    """The true sensor is turned this far about the vertical, counter-clockwise seen from above."""
+    contact_offset_m: OnRobot2 = (0.0, 0.0)
+    """The true ball is this far ahead and to the left of where the rig has it."""
+    marker_offset: InBase = (0.0, 0.0, 0.0)
+    slider_offset_m: OnRobot2 = (0.0, 0.0)
+    """Motion capture's point of the object, ahead and to the left of its middle (in the object's own frame)."""
+
+
+class HandConfig(Table, frozen=True):
+    """A force that somebody puts on the ball by hand: the sensor reads it, and nothing else feels it."""
+
+    at_s: NonNegative
+    """Since the world began."""
+    for_s: Annotated[float, Meta(gt=0, le=3600)]
+    force_body_N: Vector3
+    """On the ball, BODY frame: [-10, 0, 0] presses it backward."""
+
+
 class WorldConfig(Table, frozen=True):
     """The simulated world, used at levels sim and emulated."""
 
@@ -82,6 +111,8 @@ class WorldConfig(Table, frozen=True):
     floor: FloorConfig = FloorConfig()
     start: StartConfig = StartConfig()
     sensor: SensorModelConfig = SensorModelConfig()
+    truth: TruthConfig = TruthConfig()
+    hand: tuple[HandConfig, ...] = ()
     arm_rate_hz: Annotated[float, Meta(ge=20, le=125.5)] = 124.99
     """Cycle of the emulated controller as a clock outside sees it."""
     arm_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.21

@@ -9,6 +9,7 @@ from __future__ import annotations
 import random
 
 from robot_io.clock import NS_PER_S
+from robot_io.geometry import point_outside
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.messages import Pose2D
 from sim_backend.ridgeback.feeds import FeedWriter
@@ -16,6 +17,7 @@ from sim_backend.ridgeback.noise import FeedNoise
 from sim_backend.ridgeback.ros_graph import Message, RosGraph
 from sim_backend.ridgeback.settings import RidgebackSettings
 from sim_backend.world.plant import BaseSource
+from sim_backend.world.truth import point_of
 
 
 class MotionCapture:
@@ -34,6 +36,7 @@ class MotionCapture:
         self._settings = settings
         self._jitter = random.Random(1)
         self._base_noise, self._slider_noise = FeedNoise(settings, "base"), FeedNoise(settings, "slider")
+        self._ball_noise = FeedNoise(settings, "ball")
         self.offset = Pose2D()
         """Offset added to the measured pose of the base (a pose jump): m, m, rad."""
         self.base_hidden_until_ns = 0
@@ -42,6 +45,7 @@ class MotionCapture:
         for name, type_name, node in (
             (topics.base_pose, topics.base_pose_type, "/vicon_bridge"),
             (settings.slider_topic, topics.slider_pose_type, "/vicon_bridge"),
+            (topics.ball_pose, topics.slider_pose_type, "/vicon_bridge"),
             (topics.joint_states, topics.joint_states_type, "/ridgeback_vicon_estimator_node"),
         ):
             if name:
@@ -60,8 +64,10 @@ class MotionCapture:
         if t_ns >= self.base_hidden_until_ns:
             messages += self._base(t_ns)
         if t_ns >= self.slider_hidden_until_ns and self._graph.wanted(settings.slider_topic):
-            slider = self._slider_noise.pose(self._source.read_slider(t_ns))
+            slider = point_of(self._slider_noise.pose(self._source.read_slider(t_ns)), settings.slider_offset_m)
             messages.append((settings.slider_topic, self._writer.transform(settings.slider_topic, slider, t_ns)))
+        if settings.topics.ball_pose and self._graph.wanted(settings.topics.ball_pose):
+            messages.append(self._ball(t_ns))
         late_s = settings.mocap_latency_s + self._jitter.random() * settings.mocap_jitter_s
         if messages:
             self._loop.call_at(t_ns + round(late_s * NS_PER_S), lambda _: self._publish(messages))
@@ -80,6 +86,11 @@ class MotionCapture:
             else (name, self._writer.joint_states(name, seen, truth.twist, t_ns))
             for name in wanted
         ]
+
+    def _ball(self, t_ns: int) -> tuple[str, Message]:
+        base, topic = self._source.read_base(t_ns).pose, self._settings.topics.ball_pose
+        x, y = point_outside(base.x, base.y, base.yaw, *self._settings.ball_in_base_m)
+        return topic, self._writer.transform(topic, self._ball_noise.pose(Pose2D(x, y, base.yaw)), t_ns)
 
     def _publish(self, messages: list[tuple[str, Message]]) -> None:
         for name, message in messages:

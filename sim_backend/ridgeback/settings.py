@@ -6,8 +6,10 @@ import math
 
 import msgspec
 
+from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
 from robot_io.rig.topics import TopicsConfig
+from sim_backend.world.truth import marker_error, true_frames
 
 DEFAULT_SLIDER_TOPIC = "/vicon/ThingBox/ThingBox"
 
@@ -26,6 +28,12 @@ class RidgebackSettings(msgspec.Struct, frozen=True):
     base_rate_error: float = 0.0001
     base_from_marker: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """x (m), y (m), yaw (rad) of the marker frame in the BODY frame."""
+    ball_in_base_m: tuple[float, float] = (1.0, 0.0)
+    """Where the contact ball is in the BODY frame: motion capture sees a marker on it, where `ball_pose` names one."""
+    marker_error: Pose2D = Pose2D()
+    """Where a driver with the rig's frames takes the base to be, seen from the base; for one without markers."""
+    slider_offset_m: tuple[float, float] = (0.0, 0.0)
+    """Motion capture's point of the object, in the object's frame."""
     battery_v: float = 26.2
     mocap_noise_m: float = 0.0
     """1 sigma, as the two below."""
@@ -56,7 +64,10 @@ def ridgeback_settings(rig: RigConfig, seed: int) -> RidgebackSettings:
         mocap_rate_hz=rig.world.mocap_rate_hz,
         base_phase=rig.world.base_phase,
         base_rate_error=rig.world.base_tick_rate_error,
-        base_from_marker=rig.frames.base_from_marker,
+        ball_in_base_m=true_frames(rig).contact_in_base_m[:2],
+        base_from_marker=true_frames(rig).base_from_marker,
+        marker_error=marker_error(rig),
+        slider_offset_m=rig.world.truth.slider_offset_m,
         mocap_noise_m=rig.world.mocap_noise_m,
         mocap_noise_rad=math.radians(rig.world.mocap_noise_deg),
         odometry_noise_m_per_s=rig.world.odometry_noise_m_per_s,

@@ -14,6 +14,7 @@ from robot_io.rig.world import FloorConfig, SliderConfig
 from sim_backend.physics.floor import Floor, FloorEffects
 from sim_backend.physics.shapes import Circle, Rectangle
 from sim_backend.physics.slider import SliderModel
+from sim_backend.world.truth import true_frames
 
 
 class Scene(msgspec.Struct, frozen=True):
@@ -77,7 +78,7 @@ def place(rig: RigConfig, seed: int) -> Scene:
     path = StraightPath.of(rig.path.origin_m, rig.path.direction_deg)
     slider = path.point_in_world(contact_x - offset_x, contact_y - offset_y)
     ball_x, ball_y = path.point_in_world(0.0, lateral)
-    reach_x, reach_y = rotated(*rig.frames.contact_in_base_m[:2], path.heading)
+    reach_x, reach_y = rotated(*true_frames(rig).contact_in_base_m[:2], path.heading)
     return Scene(
         Pose2D(ball_x - reach_x, ball_y - reach_y, path.heading),
         Pose2D(*slider, math.remainder(path.heading + heading, math.tau)),

@@ -11,6 +11,8 @@ import random
 
 from robot_io.messages import Vector3
 from robot_io.rig.config import RigConfig
+from robot_io.rig.types import Matrix3
+from sim_backend.world.truth import true_frames
 
 GRAVITY_M_PER_S2 = 9.81
 
@@ -21,17 +23,25 @@ class SensorModel:
     """An FT 300 mounted on the rig: forces in, readings in the SENSOR frame out (N, N*m)."""
 
     def __init__(self, rig: RigConfig, seed: int) -> None:
-        sensor = rig.world.sensor
-        # The columns of base_from_sensor are the sensor's axes, seen from the base.
-        rows = rig.frames.base_from_sensor
-        self._axes = tuple((rows[0][i], rows[1][i], rows[2][i]) for i in range(3))
-        self._origin = rig.frames.sensor_in_base_m
-        self._contact_height_m = rig.frames.contact_in_base_m[2]
-        weight = self._in_sensor((0.0, 0.0, -sensor.tool_mass_kg * GRAVITY_M_PER_S2))
-        torque = _cross(sensor.tool_com_in_sensor_m, weight)
-        self._offset: Wrench6 = _sum6((*weight, *torque), sensor.bias)
+        self._config = sensor = rig.world.sensor
+        frames = true_frames(rig)
+        self._origin = frames.sensor_in_base_m
+        self._contact_height_m = frames.contact_in_base_m[2]
+        self.turn_to(frames.base_from_sensor)
+        x, y, z = frames.contact_in_base_m
+        # The ball is on the tool: seen from the sensor it stays where it is, whatever the arm does.
+        self._ball = self._in_sensor((x - self._origin[0], y - self._origin[1], z - self._origin[2]))
         self._noise_force, self._noise_torque = sensor.noise_force_N, sensor.noise_torque_Nm
         self._gauss = random.Random(f"ft-{seed}").gauss
+
+    def turn_to(self, base_from_sensor: Matrix3) -> None:
+        """Be held turned like this (rows): the tool weighs along other axes of the sensor."""
+        # The columns of base_from_sensor are the sensor's axes, seen from the base.
+        rows = base_from_sensor
+        self._axes = tuple((rows[0][i], rows[1][i], rows[2][i]) for i in range(3))
+        weight = self._in_sensor((0.0, 0.0, -self._config.tool_mass_kg * GRAVITY_M_PER_S2))
+        torque = _cross(self._config.tool_com_in_sensor_m, weight)
+        self._offset: Wrench6 = _sum6((*weight, *torque), self._config.bias)
 
     def true_reading(
         self, force_on_slider_world: tuple[float, float], contact_in_base: tuple[float, float], yaw: float
@@ -53,6 +63,13 @@ class SensorModel:
         force = self._in_sensor(reaction)
         moment = self._in_sensor(_cross(lever, reaction))
         return _sum6((*force, *moment), self._offset)
+
+    def with_hand(self, reading: Wrench6, force_body: Vector3) -> Wrench6:
+        """Return a reading with a force on the ball besides (N, BODY frame): it acts on the tool, as it is."""
+        if not any(force_body):
+            return reading
+        force = self._in_sensor(force_body)
+        return _sum6(reading, (*force, *_cross(self._ball, force)))
 
     def with_noise(self, reading: Wrench6) -> Wrench6:
         """Return the reading with fresh noise on each axis."""

@@ -11,13 +11,16 @@ from collections.abc import Callable
 
 from robot_io.geometry import point_outside, seen_from_frame
 from robot_io.log.world_messages import WorldCommand, WorldStall, WorldStart, WorldState
-from robot_io.messages import BodyTwist, Pose2D
+from robot_io.messages import BodyTwist, Joints, Pose2D, Vector3
 from robot_io.rig.config import RigConfig
 from sim_backend.physics.contact import FREE, PushedSlider
+from sim_backend.world.arm_geometry import held_elsewhere
 from sim_backend.world.base_plant import GRID_NS, BasePlant
+from sim_backend.world.human import Human
 from sim_backend.world.plant import ArmTruth, BaseTruth
 from sim_backend.world.scene import floor_of, place, slider_model
 from sim_backend.world.sensor_model import SensorModel
+from sim_backend.world.truth import true_frames
 
 STATE_EVERY_STEPS = 10
 STALL_STEPS = 30
@@ -57,10 +60,13 @@ class World:
             floor_of(rig, seed),
         )
         self._sensor = SensorModel(rig, seed)
-        self._arm = ArmTruth(rig.arm.held_pose_rad, (0.0,) * 6)
-        self._reach = rig.frames.contact_in_base_m[:2]
+        frames = true_frames(rig)
+        self._held, self._base_from_sensor = rig.arm.held_pose_rad, frames.base_from_sensor
+        self._human = Human(self._held, rig.world.hand, start_ns)
+        self._reach = frames.contact_in_base_m[:2]
         self._ball = point_outside(*self._plant.place, *self._reach)
         self._contact = FREE
+        self._arm_moved = False
         self._start_ns = start_ns
         self._steps = 0
         self._on_record = on_record
@@ -87,15 +93,18 @@ class World:
         self.advance_to(t_ns)
         contact = self._contact
         pose = self._plant.pose
+        if self._arm_moved:
+            joints = self._human.arm(t_ns).position
+            self._sensor.turn_to(held_elsewhere(self._base_from_sensor, self._held, joints))
         reading = self._sensor.true_reading(
             (contact.force_x, contact.force_y), _in_base(pose, contact.contact_x, contact.contact_y), pose.yaw
         )
-        return self._sensor.with_noise(reading)
+        return self._sensor.with_noise(self._sensor.with_hand(reading, self._human.force(t_ns)))
 
     def read_arm(self, t_ns: int) -> ArmTruth:
-        """See `ArmSource.read_arm`: the arm is held still."""
+        """See `ArmSource.read_arm`: the arm is held still, unless it is moved by hand."""
         self.advance_to(t_ns)
-        return self._arm
+        return self._human.arm(t_ns)
 
     def read_base(self, t_ns: int) -> BaseTruth:
         """See `BaseSource.read_base`."""
@@ -116,6 +125,18 @@ class World:
         """See `BaseSource.set_drivers`."""
         counted_ns = self._plant.set_drivers(active, at_ns)
         self._on_record(WorldCommand(counted_ns, BodyTwist(), True, active))
+
+    def press(self, force: Vector3, for_s: float, at_ns: int) -> None:
+        """Press on the ball by hand, with a force in N (BODY frame) from `at_ns` on."""
+        self._human.press(force, for_s, at_ns)
+
+    def move_arm(self, joints: Joints, in_s: float, at_ns: int) -> None:
+        """Move the arm by hand to `joints` (rad); the sensor turns with it.
+
+        A push needs the arm in its held pose, so the ball of the world stays where that has it.
+        """
+        self._arm_moved = True
+        self._human.move_arm(joints, in_s, at_ns)
 
     def _step(self) -> None:
         self._steps += 1

@@ -139,7 +139,15 @@ def world_side_is_right(module=sim_backend.world.sensor_model, mounting=MOUNTING
     #   -> ((-0.9 + 2.7 - 2.1)/3, (0.45 + 2.7 + 4.2)/3, (-0.9 - 1.35 + 4.2)/3) = (-0.1, 2.45, 0.65)
     model = module.SensorModel(rig_with((0.8, -0.1, 0.3), SKEW), 0)
     found = model.true_reading((9.0, 3.0), (1.0, 0.2), 0.0)
-    return found == pytest.approx((-8.0, 1.0, -5.0, -0.1, 2.45, 0.65), abs=1e-9)
+    if found != pytest.approx((-8.0, 1.0, -5.0, -0.1, 2.45, 0.65), abs=1e-9):
+        return False
+    # A hand on the ball, (-10, 5, 2) N in the base: it acts on the tool, so there is no minus.
+    #   force: (5 sin a + 2 cos a, -5 cos a + 2 sin a, -10) = (3.221620, -4.315225, -10)
+    #   sensor at (0.9, 0.1, 0.25), ball at (1.0, 0, 0.15): lever (0.1, -0.1, -0.1)
+    #   moment: ((-0.1) 2 - (-0.1) 5, (-0.1)(-10) - 0.1 (2), 0.1 (5) - (-0.1)(-10)) = (0.3, 0.8, -0.5)
+    #   -> (0.8 sin a - 0.5 cos a, -0.8 cos a - 0.5 sin a, 0.3) = (-0.276813, -0.901873, 0.3)
+    pressed = module.SensorModel(rig_with((0.9, 0.1, 0.25), mounting), 0).with_hand((0.0,) * 6, (-10.0, 5.0, 2.0))
+    return pressed == pytest.approx((3.221620, -4.315225, -10.0, -0.276813, -0.901873, 0.3), abs=2e-6)
 
 
 def driver_side_is_right(module=control.wrench, mounting=MOUNTING) -> bool:
@@ -269,7 +277,8 @@ def test_a_reversed_or_swapped_axis_shows_on_either_side(name):
 
 DRIVER_SIGNS = sign_mutants("control.wrench", "force_on_slider_world")
 WORLD_SIGNS = sign_mutants(
-    "sim_backend.world.sensor_model", "__init__", "true_reading", "_in_sensor", "_cross", "_sum6"
+    "sim_backend.world.sensor_model",
+    *("__init__", "turn_to", "true_reading", "with_hand", "_in_sensor", "_cross", "_sum6"),
 )
 
 

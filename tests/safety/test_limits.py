@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from robot_io.errors import ConfigError
-from robot_io.rig.config import shipped_rigs
+from robot_io.rig.files import shipped_rigs
 from safety.limits import CEILINGS, MAX_SPEED_M_PER_S, check, speed_limit_m_per_s
 from safety.settings import SafetySettings
 from tools.rig import resolve_rig

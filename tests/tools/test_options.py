@@ -25,9 +25,9 @@ OPTIONS = {
     for words, parser in PARSERS.items()
     for action in parser._actions
 }
-PATHS = [name for name in OPTIONS if name.split()[-1] in ("--out", "--compare", "log", "rig", "grid")]
+PATHS = [name for name in OPTIONS if name.split()[-1] in ("--out", "--apply", "--compare", "log", "rig", "grid")]
 
-FOR_NUMBERS = ("M", "N", "S", "MU", "RATIO", "K_F", "X", "LOW,HIGH", "SEED", "K_F,K_Y")
+FOR_NUMBERS = ("M", "N", "S", "MU", "RATIO", "K_F", "X", "LOW,HIGH", "SEED", "K_F,K_Y", "DEG", "MM")
 NUMBERS = [
     name
     for name, action in OPTIONS.items()

@@ -1,7 +1,8 @@
 """`push emulate ft300|ur10|ridgeback|all`: run the wire emulators for any client, until SIGTERM or Ctrl-C.
 
-A single device is fed by a constant source; `all` runs the three on one simulated world. Everything listens on
-loopback only. One line per endpoint is printed as soon as it accepts clients.
+A single device is fed by a constant source; `all` runs the three on one simulated world, and reads what a person does
+to the robot by hand as JSON lines on stdin (`tools.run.hands`). Everything listens on loopback only. One line per
+endpoint is printed as soon as it accepts clients.
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ import contextlib
 import ipaddress
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from types import FrameType
 
 from robot_io.clock import monotonic_ns
-from robot_io.error_report import say_json
+from robot_io.error_report import printable, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import set_timer_slack_1ns
@@ -27,6 +29,7 @@ from sim_backend.ur10.standalone import StillArm
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
 from tools.run.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
+from tools.run.hands import Hands
 from tools.terminal.arguments import SEED, name_or_path, number
 
 ARM_HOST = "127.0.0.10"
@@ -61,7 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")
     base.set_defaults(open_devices=_open_ridgeback)
 
-    everything = devices.add_parser("all", help="all three on one simulated world")
+    everything = devices.add_parser(
+        "all", help="all three on one simulated world; stdin takes what hands do, as JSON lines"
+    )
     everything.add_argument(
         "rig", nargs="?", type=name_or_path, default="emulated", help="whose world: a shipped name or a path (emulated)"
     )
@@ -158,6 +163,8 @@ def _open_all(loop: EventLoop, args: argparse.Namespace, opened: contextlib.Exit
         with _elsewhere(options):
             emulators.append(open_device())
         opened.callback(emulators[-1].close)
+    if sys.stdin is not None:
+        Hands(loop, sys.stdin.fileno(), world, lambda words: tell(printable(f"push: {words}")))
     return emulators
 
 

@@ -8,20 +8,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from control.laws.shipped import is_shipped
 from robot_io.error_report import printable, say_json, tell
 from robot_io.errors import ReplayDiffers
 from robot_io.log.log_format import FORMAT_FACT
-from robot_io.rig.config import rig_from_toml, rig_to_toml
-from robot_io.rig.toml import parse_setting
 from tools.places.find_log import find_log
+from tools.replay import what_if_report
 from tools.replay.difference import Difference
 from tools.replay.fold import ReplayResult, replay
-from tools.replay.law import law_of
-from tools.replay.verified_log import VerifiedLog
+from tools.replay.what_if import what_if
 from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
 from tools.run.facts.run_facts import code_and_machine
-from tools.run.tick_core import TickCore
 from tools.terminal.arguments import named_path, number
 
 DIFFERS = ReplayDiffers.exit_code
@@ -46,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """Replay; return 0 if identical, 7 if different. Raises LogDamaged (8) for a log that cannot be trusted."""
     path = find_log(args.log)
     if args.what_if:
-        return what_if(path, args)
+        return answer_what_if(path, args)
     result = replay(path, tolerance=args.tolerance, law=args.law)
     for line in lines(result):
         (tell if args.json else print)(printable(line))
@@ -130,48 +126,14 @@ def machine_differences(facts: dict[str, str]) -> list[str]:
     return [f"{name} was {facts[name]}, is {value}" for name, value in now.items() if facts[name] != value]
 
 
-def what_if(path: Path, args: argparse.Namespace) -> int:
-    """Re-run the log's inputs with other settings and print what the law would have commanded."""
-    log = VerifiedLog(path)
-    log.require_config()
-    other = rig_from_toml(rig_to_toml(log.usable_rig()), overrides=args.what_if)
-    law, _ = law_of(path, other.control, args.law or _law_of_what_if(args.what_if))
-    core = TickCore.of(other, in_contact=log.in_contact, law=law)
-    state = None
-    count = changed = 0
-    worst = 0.0
-    worst_tick = -1
-    for _, _, _, tick in log.messages():
-        if tick is None:
-            continue
-        state, output = core.fold(tick.before[0] if state is None else state, tick.input)
-        old, new = tick.output.wanted_world, output.wanted_world
-        off = math.hypot(old.vx - new.vx, old.vy - new.vy)
-        count += 1
-        changed += off > 0.0
-        if off > worst:
-            worst, worst_tick = off, tick.input.tick
-    show = tell if args.json else print
-    show(f"what if {', '.join(args.what_if)}: the commands the law would have given; the world does not react to them")
-    show(f"{changed} of {count} ticks would differ, at most by {worst:.4f} m/s (tick {worst_tick})")
+def answer_what_if(path: Path, args: argparse.Namespace) -> int:
+    """Re-run the log's inputs with other settings and say what would differ."""
+    result = what_if(path, args.what_if, law=args.law)
+    for line in what_if_report.lines(result):
+        (tell if args.json else print)(printable(line))
     if args.json:
-        say_json(
-            {
-                "schema": 1,
-                "what_if": args.what_if,
-                "ticks": count,
-                "changed": changed,
-                "worst_m_per_s": worst,
-                "worst_tick": worst_tick,
-            }
-        )
+        say_json(what_if_report.as_json(result))
     return 0
-
-
-def _law_of_what_if(settings: list[str]) -> str:
-    """Return the law of one's own that `--what-if control.law=...` names, as `--law` would; "" without one."""
-    named = [str(value) for key, value in map(parse_setting, settings) if key == ("control", "law")]
-    return named[-1] if named and not is_shipped(named[-1]) else ""
 
 
 def _plain(found: Difference | None) -> dict[str, Any] | None:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import argparse
-import json
+import socket
 from pathlib import Path
 from typing import Any
 
-from control.laws.shipped import SHIPPED, is_shipped
+import msgspec
+
 from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
-from robot_io.tick import TickInput, TickOutput, TickState
-from tools.commands.run_outputs import save_tare, write_report, write_summary
+from tools.commands.run_laws import add_law_arguments, check_law, law_overrides, note_passed_law
+from tools.commands.run_outputs import save_tare, unused_faults, with_injected, write_report, write_summary
+from tools.commands.run_trials import check_trials, run_battery
 from tools.laws import own_law
-from tools.places import law_proof, run_dir, saved_tare
+from tools.live.arguments import add_live_arguments
+from tools.live.view import check_live, live_view
+from tools.places import run_dir, saved_tare
 from tools.places.device_locks import DeviceLocks
+from tools.places.running import announced
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
@@ -24,9 +29,8 @@ from tools.run.awake import awake
 from tools.run.facts.bounds import bounds_of, check_room
 from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
-from tools.run.run_state import status_line
 from tools.terminal import verdict
-from tools.terminal.arguments import SEED, name_or_path, named_path, number
+from tools.terminal.arguments import SEED, name_or_path, named_path, note, number, whole_number
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
 from tools.verdict.arm_pose import arm_pose_notes
@@ -42,10 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--distance-m", type=number(0.001, 1000), metavar="M", help="how far to push, from first contact"
     )
-    parser.add_argument(
-        "--law", metavar="LAW", help=f"{', '.join(SHIPPED)}, or your own as module:Class (default: the rig's)"
-    )
-    parser.add_argument("--controller", metavar="LAW", help="earlier name of --law")
+    add_law_arguments(parser)
     parser.add_argument("--seed", type=SEED, metavar="SEED", default=0, help="seed of the simulated world (0)")
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
@@ -71,8 +72,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--drive-blind", action="store_true", help="let a real base move although its sensor or arm is emulated"
     )
     parser.add_argument(
-        "--untested-law", action="store_true", help="let a law of your own move a real robot without an emulated run"
+        "--trials", type=whole_number(1, 1000), metavar="N", help="a battery: N pushes, asking before each, and a table"
     )
+    parser.add_argument("--note", type=note, default="", metavar="TEXT", help="a remark, kept in log and report")
+    add_live_arguments(parser)
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
@@ -89,42 +92,70 @@ def run(args: argparse.Namespace) -> int:
 
         as_json = args.json
         return check_only(rig, folder_of(args.rig), as_json=as_json) if args.check else dry_run(rig, as_json=as_json)
-    simulated = bool(devices_at(rig, "sim"))
-    if not simulated:
+    if not devices_at(rig, "sim"):
         tell_levels(rig)
     if not devices_at(rig, "hardware"):
         tell_bounds(rig)
     with DeviceLocks(rig):
         if devices_at(rig, "hardware"):
             prepare(args, rig)
-        out = run_dir.create(args.out, rig.name)
-        early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
-        try:
-            summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
-        except BaseException:
-            if early is not None:
-                early.drop()
-            raise
+        if args.trials:
+            return run_battery(args, rig, lambda one, out: finish(one, *push_once(one, rig, out, saved)))
+        pushed = push_once(args, rig, args.out, saved)
+    summary = finish(args, *pushed)
+    if args.json:
+        with ignoring_output_errors():
+            say_json(summary)
+    return int(summary["exit_code"])
+
+
+def push_once(
+    args: argparse.Namespace, rig: RigConfig, out: Path | None, saved: SavedTare | None
+) -> tuple[dict[str, Any], ReportProcess | None]:
+    """Push, tell the verdict and return the summary, with the process that makes the report where one has begun.
+
+    out: the run's folder, None for a new one.
+    """
+    simulated = bool(devices_at(rig, "sim"))
+    out = run_dir.create(out, rig.name)
+    early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
+    try:
+        summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
+    except BaseException:
+        if early is not None:
+            early.drop()
+        raise
     summary |= {"bounds": bounds_of(rig), "report": None}
     if blind := blind_words(rig):
         summary["notes"].insert(0, blind)
+    say_lines(verdict.person_lines(summary), as_json=args.json)
     write_summary(summary, out)
+    return summary, early
+
+
+def finish(args: argparse.Namespace, summary: dict[str, Any], early: ReportProcess | None) -> dict[str, Any]:
+    """Write the report of a run whose verdict has been told; return its summary. Raises UsageError: an unused fault."""
+    out = Path(summary["out"])
     if not args.no_report:
+        tell("writing the report ...")
         write_report(summary, out, early)
         write_summary(summary, out)
-    unused = unused_faults(summary)
-    with ignoring_output_errors():
-        for line in verdict.person_lines(summary):
-            tell(line) if args.json else print(line)
-        if args.json and not unused:
-            say_json(summary)
-    if unused:
+        if summary["report"]:
+            say_lines([f"report: {summary['report']}"], as_json=args.json)
+    if unused := unused_faults(summary):
         raise UsageError(
             f"the fault `{unused[0]}` changed nothing",
             where="push run",
             do=f"Choose a time within the run; what came of the run is in {out}",
         )
-    return int(summary["exit_code"])
+    return summary
+
+
+def say_lines(lines: list[str], *, as_json: bool) -> None:
+    """Print lines for people at once: on stdout, or on stderr where that is for JSON."""
+    with ignoring_output_errors():
+        for line in lines:
+            tell(line) if as_json else print(line, flush=True)
 
 
 def overrides(args: argparse.Namespace) -> list[str]:
@@ -132,11 +163,7 @@ def overrides(args: argparse.Namespace) -> list[str]:
     found = list(args.overrides)
     if args.distance_m is not None:
         found.append(f"control.distance_m={args.distance_m!r}")
-    if args.controller is not None:
-        tell("--controller is called --law now")
-        found.append(f"control.law={json.dumps(args.controller)}")
-    if args.law is not None:
-        found.append(f"control.law={json.dumps(args.law)}")
+    found += law_overrides(args)
     if args.start_in_contact:
         found.append("world.start.gap_m=0.0")
     return found
@@ -159,25 +186,10 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
     check_room(rig, args.seed)
-
-
-def check_law(rig: RigConfig) -> None:
-    """Raise UsageError for a law of one's own that has not passed an emulated run with this very source."""
-    if not is_shipped(rig.control.law) and not law_proof.has_passed(rig.control.law_facts):
-        raise UsageError(
-            f"the law `{rig.control.law}` has not yet passed an emulated run with its present source",
-            where="push run",
-            do=f"Run it emulated first (push run emulated --law {rig.control.law}), or add --untested-law",
-        )
-
-
-def note_passed_law(rig: RigConfig, summary: dict[str, Any]) -> None:
-    """Note for later that a law of one's own has passed, if every device was emulated."""
-    if summary["exit_code"] == 0 and summary["level"] == "emulated" and not is_shipped(rig.control.law):
-        try:
-            law_proof.save(rig.control.law_facts, rig.name, summary["log"])
-        except (OSError, PushError) as error:
-            summary["notes"].append(f"that this law has passed could not be noted: {error}")
+    if args.trials and not (args.dry_run or args.check):
+        check_trials(args, rig)
+    if args.live:
+        check_live(args.live_port, fast=args.fast)
 
 
 def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
@@ -200,7 +212,16 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
         allow_descriptors(MOST_DESCRIPTORS)
 
-        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
+        launcher = Launcher(
+            rig,
+            out,
+            seed=args.seed,
+            saved=saved,
+            live=LiveLine(rig),
+            kind_folder=folder_of(args.rig),
+            note=args.note,
+            live_port=args.live_port if args.live else None,
+        )
         with awake():
             figures = launcher.run()
     except BaseException:
@@ -215,51 +236,51 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         log=launcher.log,
         seed=args.seed,
         level=level_of(rig),
+        note=args.note,
         devices=launcher.devices(figures),
         notes=[*arm_pose_notes(rig, figures), *launcher.notes],
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
     note_passed_law(rig, summary)
-    return with_injected(summary, launcher.injected(figures))
+    return with_injected(summary, launcher.injected(figures)) | {"latency": launcher.latencies()}
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+    """Run level sim, with its live view where one is wanted, and return its summary."""
+    with live_view(args.live_port if args.live else None) as to_view:
+        return lockstep_summary(args, rig, out, saved, to_view)
+
+
+def lockstep_summary(
+    args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None, to_view: socket.socket | None
+) -> dict[str, Any]:
     """Run level sim in this process and return its summary."""
-    from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
+    from tools.run.lockstep import Lockstep, open_log
+    from tools.run.paced import PacedRun, run_fast
 
     law = own_law(rig.control, folder_of(args.rig))
     text = run_dir.write_config(out, rig)
-    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved, law=law)
     except PushError:  # an impossible world: nothing has started
         log.abandon()
         run_dir.discard(out)
         raise
-    stop_on_signals(one)
-    live = LiveLine(rig, quiet=args.fast)
-    pace = WallPace(1.0 / rig.loop.rate_hz)
-    every = max(1, round(rig.loop.rate_hz / 5.0))
-
-    def on_tick(inp: TickInput, state: TickState, output: TickOutput) -> None:
-        if not args.fast:
-            pace.wait()
-            if inp.tick % every == 0:
-                live.show(status_line(inp, state, output))
-
+    live = LiveLine(rig)
     try:
         try:
-            figures = one.run(on_tick)
+            with announced(rig, out / "run.mcap"):
+                figures = run_fast(one) if args.fast else PacedRun(one, live).run()
         finally:
+            live.close()
             log.finish({})
     except OSError as error:  # only the log is outside this process here
         log.abandon()
         raise EnvironmentFault(
             f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Free some space"
         ) from None
-    live.end()
-    live.close()
     save_tare(rig, figures)
     summary = verdict.summary(
         rig,
@@ -268,19 +289,10 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         log=out / "run.mcap",
         seed=args.seed,
         level="sim",
+        note=args.note,
         devices=figures["devices"],
         notes=arm_pose_notes(rig, figures),
         witness=Witness(),
         pushed=object_pose(rig.path, log.object_poses),
     )
-    return with_injected(summary, figures["injected"])
-
-
-def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
-    """Return the summary and, if faults were injected, how many samples each has changed."""
-    return summary | {"injected": counts} if counts else summary
-
-
-def unused_faults(summary: dict[str, Any]) -> list[str]:
-    """Return the faults to inject that changed nothing."""
-    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]
+    return with_injected(summary, figures["injected"]) | {"latency": msgspec.to_builtins(log.latencies)}

@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import inspect
 import sys
+from datetime import datetime
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Meta
 
-from robot_io.rig import config, task, topics, world
+from robot_io.rig import calibration, config, task, topics, world
 from robot_io.rig.config import RigConfig
 from robot_io.rig.notes import notes_of
 from robot_io.rig.renames import RENAMED, RETIRED, advice
+from robot_io.rig.types import row_of, table_of
 
 INTRO = """# Rig files
 
@@ -28,6 +30,11 @@ A rig file is TOML and describes one robot, real or not. `push run NAME` uses a 
 
     [control]
     push_speed_m_per_s = 0.08
+
+`include = ["calibration/frame-2026-07-01.toml"]` takes the keys of other files, such as calibrations. First comes
+the rig that is extended, then what is included, then the file's own keys. A key in two included files, or in one
+and in the file itself, is an error that names both lines. Paths are relative to the file that says `extends` or
+`include`. What is included cannot include or extend. `push config show --origin` says where each value was written.
 
 `push config show RIG` prints every value, `push config check RIG` reports every mistake at once, and
 `--set control.k_f=0.1` changes one value for one run. The unit is in the key; ranges are checked; for an unknown
@@ -55,7 +62,7 @@ format.
 def reference() -> str:
     """Return the page."""
     parts = [INTRO]
-    notes = notes_of(config, task, topics, world)
+    notes = notes_of(config, task, calibration, topics, world)
     for title, table in _tables(RigConfig, ""):
         parts.append(f"\n## {f'[{title}]' if title else 'Top level'}\n")
         doc = inspect.cleandoc(table.__doc__ or "")
@@ -63,7 +70,7 @@ def reference() -> str:
         parts.append("| key | type and range | default | |\n|---|---|---|---|")
         hints = get_type_hints(table, include_extras=True)
         for field in msgspec.structs.fields(table):
-            if _is_table(hints[field.name]):
+            if table_of(hints[field.name]) or row_of(hints[field.name]):
                 continue
             note = notes.get((table.__name__, field.name), "").replace("\n", " ").replace("|", "\\|")
             parts.append(f"| `{field.name}` | {_type_text(hints[field.name])} | {_default(field)} | {note} |")
@@ -77,13 +84,15 @@ def _tables(table: type[msgspec.Struct], prefix: str) -> list[tuple[str, type[ms
     found = [(prefix, table)]
     hints = get_type_hints(table)
     for field in msgspec.structs.fields(table):
-        if _is_table(hints[field.name]) and field.name not in ("declared", "law_facts"):  # written by the program
-            found += _tables(hints[field.name], f"{prefix}.{field.name}" if prefix else field.name)
+        name = f"{prefix}.{field.name}" if prefix else field.name
+        below = table_of(hints[field.name])
+        if below and below is found[-1][1]:  # one text for several tables of a kind
+            found[-1] = (f"{found[-1][0]}], [{name}", below)
+        elif below and field.name not in ("declared", "law_facts"):  # written by the program
+            found += _tables(below, name)
+        if row := row_of(hints[field.name]):
+            found.append((f"[{name}]", row))
     return found
-
-
-def _is_table(hint: Any) -> bool:
-    return isinstance(hint, type) and issubclass(hint, msgspec.Struct)
 
 
 def _type_text(hint: Any) -> str:
@@ -102,7 +111,8 @@ def _type_text(hint: Any) -> str:
         return " or ".join(_type_text(part) for part in get_args(hint) if part is not NoneType)
     if get_origin(hint) is dict:
         return "table"
-    return {float: "number", int: "integer", str: "text", bool: "true or false"}.get(hint, str(hint))
+    names = {float: "number", int: "integer", str: "text", bool: "true or false", datetime: "date and time with zone"}
+    return names.get(hint, str(hint))
 
 
 def _bounds(meta: Meta) -> list[str]:

@@ -29,6 +29,7 @@ from sim_backend.world.world import World
 from tools.kinds import is_shipped
 from tools.rig import devices_at, kinds_of, with_addresses
 from tools.run.emulators import Emulator, address_of, open_emulator
+from tools.run.hands import Hands
 
 READY_WITHIN_S = 20.0
 ENDS_WITHIN_S = 2.0
@@ -43,22 +44,25 @@ class EmulatedJob(msgspec.Struct, frozen=True):
     devices: tuple[str, ...]
     faults: tuple[str, ...]
     parent_pid: int
+    hands_fd: int = -1
+    """Where lines of what a person does to the robot come from; -1: nobody is there."""
     status_fd: int = -1
 
 
 @contextlib.contextmanager
-def emulators(rig: RigConfig, kind_folder: str, faults: Sequence[str]) -> Iterator[RigConfig]:
+def emulators(rig: RigConfig, kind_folder: str, faults: Sequence[str], hands_fd: int = -1) -> Iterator[RigConfig]:
     """Serve the rig's devices at level emulated; give the rig with their addresses.
 
-    faults: what is wrong with them, in words. Raises PushError where they cannot be served.
+    faults: what is wrong with them, in words. hands_fd: the reading end of a pipe for the lines of `tools.run.hands`,
+    which stays the caller's. Raises PushError where they cannot be served.
     """
     check_faults(rig, faults)
     devices = tuple(devices_at(rig, "emulated"))
     if not devices:
         yield rig
         return
-    job = EmulatedJob(rig_to_toml(rig), kind_folder, devices, tuple(faults), os.getpid())
-    child = spawn("emulators", "tools.doctor.emulated", job, [])
+    job = EmulatedJob(rig_to_toml(rig), kind_folder, devices, tuple(faults), os.getpid(), hands_fd)
+    child = spawn("emulators", "tools.doctor.emulated", job, [] if hands_fd < 0 else [hands_fd])
     try:
         if not child.wait_ready(READY_WITHIN_S):
             if child.errors:
@@ -115,6 +119,8 @@ def main() -> int:
         return error.exit_code
     addresses = {device: address_of(emulator) for device, emulator in opened.items()}
     spoil(loop, opened, job.faults, rig)
+    if job.hands_fd >= 0:
+        Hands(loop, job.hands_fd, world, lambda words: print(words, file=sys.stderr))
     try_realtime(PRIORITY)
     status.say("ready", addresses=addresses)
     loop.run()  # SIGTERM ends the process: its ports and sockets go with it

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from robot_io.errors import PushError, UsageError
 from robot_io.rig.config import RigConfig
 from safety.faults import FAULTS
@@ -11,6 +13,7 @@ from tools.doctor.check import Check, Rows
 from tools.rig import devices_at
 from tools.run.facts.bounds import check_room, stopping_line, workspace_line
 from tools.terminal.gain_warning import gain_warning
+from tools.verdict.calibration_age import calibration_age
 
 
 def rig_checks(rig: RigConfig) -> list[Check]:
@@ -89,6 +92,10 @@ def _calibration(rows: Rows, rig: RigConfig) -> None:
     if devices_at(rig, "sim"):
         rows.skip("calibration-age", "the frames of level sim are exact")
         return
-    told = "never calibrated: the rig does not say when its frames, contact point and path were measured"
-    fix = "Measure them (docs/frames-and-signs.md): one degree of the sensor costs about a decimetre over 6 m"
-    rows.bad("calibration-age", "warning", told, fix)
+    age, limit = calibration_age(rig, time.time()), rig.calibration.max_age_days
+    if not age.words:
+        told = f"calibrated: {', '.join(rig.calibration.made())}"
+        rows.ok("calibration-age", told, age.oldest_days, limit, "days")
+        return
+    fix = "`push calibrate` measures them: one degree of the sensor costs about a decimetre beside the path"
+    rows.bad("calibration-age", "warning", age.words, fix, age.oldest_days, limit, "days")

@@ -22,6 +22,16 @@ def write_atomically(path: Path, content: bytes, *, mode: int = 0o644) -> None:
         raise
 
 
+def write_new(path: Path, content: bytes) -> None:
+    """Write a file where there is none. Raises FileExistsError and OSError, and then leaves nothing behind."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(content)
+        path.hardlink_to(part)  # unlike a rename, this never replaces another file
+    finally:
+        part.unlink(missing_ok=True)
+
+
 def write_json(path: Path, value: object) -> None:
     """Write a JSON file for people and programs. Raises OSError, or ValueError for a number that is not finite."""
     write_atomically(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())

@@ -35,7 +35,8 @@ def power_cycle(rig: RigConfig) -> str:
     if rig.ft.level == "hardware":
         boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
         return f"{rig.ft.port} {boot} {_digest((rig.ft.kind, rig.ft.options, rig.ft.declared))}"
-    return _digest((rig.ft.kind, rig.ft.options, rig.ft.declared, rig.world.sensor, rig.frames, rig.arm.held_pose_rad))
+    world = (rig.world.sensor, rig.world.truth, rig.frames, rig.arm.held_pose_rad)
+    return _digest((rig.ft.kind, rig.ft.options, rig.ft.declared, *world))
 
 
 def _digest(parts: object) -> str:

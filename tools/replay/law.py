@@ -5,6 +5,7 @@ A log never causes an import: what it says of its law is not looked for, only co
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -12,10 +13,11 @@ from msgspec.structs import replace
 from control.laws.law import Law
 from control.laws.shipped import is_shipped
 from robot_io.errors import EnvironmentFault, UsageError
-from robot_io.rig.config import ControlConfig
+from robot_io.rig.config import ControlConfig, RigConfig
 from tools.laws import build_own, find_law, source_sha256
 from tools.replay.code_origin import CodeOrigin
 from tools.run.facts.run_facts import LAW_SOURCE_FACT
+from tools.run.tick_core import TickCore
 
 _SHOWN = 12
 
@@ -43,6 +45,22 @@ def law_of(log: Path, control: ControlConfig, given: str) -> tuple[Law | None, s
         return None, ""
     found = find_law(given, str(Path.cwd()))
     return build_own(found, replace(control, law=given)), source_sha256(found)
+
+
+def core_maker(log: Path, control: ControlConfig, given: str, *, in_contact: bool) -> Callable[[RigConfig], TickCore]:
+    """Return what makes the core of a log's rig, and of that rig with other settings.
+
+    control: of the log. given: what `--law` names. Another law of one's own than the log's was named by the settings,
+    which is as good. Raises as `check_given`; what it returns raises as `law_of`.
+    """
+    check_given(log, control.law, given)
+
+    def core(rig: RigConfig) -> TickCore:
+        named = given if rig.control.law == control.law else rig.control.law
+        law, _ = law_of(log, rig.control, "" if is_shipped(rig.control.law) else named)
+        return TickCore.of(rig, in_contact=in_contact, law=law)
+
+    return core
 
 
 def with_law_source(made_by: CodeOrigin, facts: dict[str, str], sha256: str) -> CodeOrigin:

@@ -8,6 +8,7 @@ import msgspec
 
 from control.notes.push_course import PushCourse
 from control.notes.run_notes import outcome
+from robot_io.clock import NS_PER_S
 from robot_io.tick import ControlTick, Mode
 from safety.faults import FAULTS
 from tools.report.run_data import RunData
@@ -19,12 +20,17 @@ from tools.verdict.witness import Witness
 
 
 class Verdict(NamedTuple):
-    """How the run ended: one line, the reason, whether it is done, and the evidence for and against it."""
+    """How the run ended: one line, the reason, whether it is done, and the evidence for and against it.
+
+    first_fault: the row of the fault table that stopped it, "" where none did. word: the verdict in a word or two.
+    """
 
     line: str
     why: str
     good: bool
     trust: tuple[TrustItem, ...] = ()
+    first_fault: str = ""
+    word: str = "did not start"
 
 
 def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
@@ -34,7 +40,7 @@ def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
             "Did not start", "The loop did not start: the devices were not ready, or it was stopped first.", False
         )
     end = _figures(run, run.last)
-    trust = _told(summary) or tuple(gather(run.rig, end, _witness(run)))
+    trust = _told(summary) or tuple(gather(run.rig, end, _witness(run), _ended_s(run, run.last)))
     distance, lateral = f"{end['distance_m']:.2f} m", f"{end['lateral_error_m']:+.3f} m"
     first = first_fault(run.rig, end)
     why = cause_words(first, end["faults"]) if first else _without_first(end["faults"])
@@ -45,17 +51,20 @@ def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
             f"The log ends during the run (phase {phase}){': ' + why if why else ''}.",
             False,
             trust,
+            first.id if first else "",
+            "aborted",
         )
     judged = judge(end["exit_code"], trust)
     if end["exit_code"] == 0:
         against = "; ".join(item.text for item in trust if item.says == "against")
         line = f"Pushed {distance}" + (f", {judged.verdict}" if against else "")
         why = f"Lateral error at the end: {lateral}." + (f" Against the run: {against}." if against else "")
-        return Verdict(line, why, not judged.exit_code, trust)
+        return Verdict(line, why, not judged.exit_code, trust, word=judged.verdict)
     if not why and judged.verdict == CONTACT_LOST:
         why = contact_loss_reason(end["contact_seen"]).capitalize()
     why = f"{why or 'See the safety events'}. Lateral offset at the end: {lateral}."
-    return Verdict(f"{judged.verdict.capitalize()} after {distance}", why, False, trust)
+    line = f"{judged.verdict.capitalize()} after {distance}"
+    return Verdict(line, why, False, trust, first.id if first else "", judged.verdict)
 
 
 def _without_first(faults: list[str]) -> str:
@@ -82,6 +91,12 @@ def _witness(run: RunData) -> Witness:
     counted = [value for key, value in run.facts.items() if key.startswith("dropped_") or key == "undecodable"]
     missing = sum(int(value) for value in counted if value.isdecimal())
     return Witness(f"recovered, {run.recovered}" if run.recovered else "", missing)
+
+
+def _ended_s(run: RunData, last: ControlTick) -> float | None:
+    """Return when a run ended (s since the epoch), None where its log does not tell."""
+    offset = run.facts.get("wall_offset_ns", "")
+    return (last.input.now_ns + int(offset)) / NS_PER_S if offset.lstrip("-").isdecimal() else None
 
 
 def _told(summary: dict[str, Any]) -> tuple[TrustItem, ...]:

@@ -23,7 +23,7 @@ def gain_warning(rig: RigConfig) -> str | None:
 
     Raises ConfigError if the simulated slider is not possible (it would tip over).
     """
-    control, bodies = rig.control, _bodies(rig)
+    control, bodies = rig.control, rig_bodies(rig)
     if control.law not in GAINS_MATTER or not bodies:
         return None
     highest = limit(bodies, control.k_f)
@@ -48,7 +48,7 @@ def _integral_warning(control: ControlConfig, bodies: list[PushedBody]) -> str |
     )
 
 
-def _bodies(rig: RigConfig) -> list[PushedBody]:
+def rig_bodies(rig: RigConfig) -> list[PushedBody]:
     """Return the sliders of `[sliders]`, and the simulated one if there is one."""
     world, pressure = rig.world, rig.sliders.pressure
     effects = FloorEffects(

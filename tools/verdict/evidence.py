@@ -8,6 +8,7 @@ import msgspec
 
 from robot_io.rig.config import RigConfig
 from safety.checks.task_checks import RESIDUAL_N
+from tools.verdict.calibration_age import CalibrationAge, calibration_age
 from tools.verdict.witness import Witness
 
 MOST_LOST_SHARE = 0.1
@@ -35,8 +36,11 @@ class TrustItem(msgspec.Struct, frozen=True):
     text: str
 
 
-def gather(rig: RigConfig, figures: dict[str, Any], witness: Witness) -> list[TrustItem]:
-    """Return the evidence of a run, from its figures (`control.notes.run_notes`) and from what else is known of it."""
+def gather(rig: RigConfig, figures: dict[str, Any], witness: Witness, ended_s: float | None = None) -> list[TrustItem]:
+    """Return the evidence of a run, from its figures (`control.notes.run_notes`) and from what else is known of it.
+
+    ended_s: when it ended, s since the epoch; without it the age of calibrations is no question.
+    """
     items = [
         *_line(rig, figures),
         *_contact(figures),
@@ -55,6 +59,8 @@ def gather(rig: RigConfig, figures: dict[str, Any], witness: Witness) -> list[Tr
         items.append(_preflight(witness.unanswered))
     if rig.base.pose_source == "odometry":
         items.append(_item("pose", "unknown", "the pose is odometry: nothing independent says where the base was"))
+    if ended_s is not None and rig.calibration.made():
+        items.append(_calibration(calibration_age(rig, ended_s), rig.calibration.max_age_days))
     return items
 
 
@@ -155,3 +161,9 @@ def _preflight(unanswered: int) -> TrustItem:
         return _item("preflight", "for", "the base's preflight was answered", 0, 0, "questions")
     text = f"{unanswered} questions of the base's preflight were not answered"
     return _item("preflight", "unknown", text, unanswered, 0, "questions")
+
+
+def _calibration(age: CalibrationAge, limit: float) -> TrustItem:
+    says: Says = "unknown" if age.words else "for"
+    text = age.words or "sensor and contact point were calibrated lately"
+    return _item("calibration", says, text, age.oldest_days, limit, "days")

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from robot_io.errors import ConfigError, UsageError
 from robot_io.rig import toml as toml_text
-from robot_io.rig.config import ControlConfig, RigConfig, load_rig, rig_from_toml, rig_to_toml, shipped_rigs
+from robot_io.rig.config import ControlConfig, RigConfig, load_rig, rig_from_toml, rig_to_toml
+from robot_io.rig.files import shipped_rigs
+from robot_io.rig.types import row_of, table_of
 
 DIMENSIONLESS = {
     "ros_version": "a version number",
@@ -29,15 +31,18 @@ DIMENSIONLESS = {
     "patch_strength": "a part of the mean",
     "base_from_sensor": "a rotation matrix",
     "base_from_marker": "m, m, rad: in the docstring",
+    "marker_offset": "m, m, rad: in the docstring",
     "bias": "N and N*m: in the docstring",
     "range": "N and N*m: in the docstring",
     "resolution": "N and N*m: in the docstring",
     "noise": "N and N*m: in the docstring",
     "options": "only the kind knows",
     "law_settings": "only the law knows",
+    "uncertainty": "in `unit`",
+    "residual": "in `unit`",
 }
 SUFFIXES = (
-    *("_m", "_s", "_ms", "_N", "_Nm", "_rad", "_deg", "_hz", "_kg", "_m_per_s", "_rad_per_s"),
+    *("_m", "_s", "_ms", "_days", "_N", "_Nm", "_rad", "_deg", "_hz", "_kg", "_m_per_s", "_rad_per_s"),
     *("_m_per_s2", "_rad_per_s2", "_per_s", "_rad_per_m"),
 )
 
@@ -49,8 +54,8 @@ def write(path: Path, text: str) -> Path:
 
 def numeric_keys(kind: type[msgspec.Struct]):
     for field in msgspec.structs.fields(kind):
-        if isinstance(field.type, type) and issubclass(field.type, msgspec.Struct):
-            yield from numeric_keys(field.type)
+        if table := table_of(field.type) or row_of(field.type):
+            yield from numeric_keys(table)
         elif re.search(r"\b(float|int)\b|Literal\[\d", str(field.type)):
             yield field.name
 

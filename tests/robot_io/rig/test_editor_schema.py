@@ -9,8 +9,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robot_io.rig.config import RIGS_DIR, load_rig, rig_to_toml, shipped_rigs
+from robot_io.rig.config import load_rig, rig_to_toml
 from robot_io.rig.editor_schema import rig_schema
+from robot_io.rig.files import RIGS_DIR, shipped_rigs
 
 SCHEMA = json.loads(json.dumps(rig_schema()))
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from robot_io.errors import ConfigError
-from robot_io.rig.config import load_rig, shipped_rigs
+from robot_io.rig.config import load_rig
+from robot_io.rig.files import shipped_rigs
 from tools.rig import resolve_rig
 
 # Denavit-Hartenberg parameters of the UR10 (Universal Robots' published table): d, a in m, alpha in rad.

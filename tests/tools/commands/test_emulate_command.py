@@ -25,10 +25,10 @@ PUSH = [sys.executable, "-c", "from robot_io._entry import main; raise SystemExi
 
 
 @contextlib.contextmanager
-def emulate(*argv, lines=1):
+def emulate(*argv, lines=1, stdin=subprocess.DEVNULL):
     """Start `push emulate ... --json`; give the process and its endpoint lines."""
     with subprocess.Popen(
-        [*PUSH, *argv, "--json"], cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [*PUSH, *argv, "--json"], cwd=ROOT, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as child:
         try:
             yield child, [json.loads(read_line(child)) for _ in range(lines)]
@@ -119,6 +119,57 @@ def test_all_share_one_world():
         websocket.create_connection(base["url"], timeout=5.0).close()
         child.send_signal(signal.SIGTERM)
         assert child.wait(timeout=10) == 0
+
+
+QUIET = (
+    *("--set", "world.sensor.noise_force_N=0", "--set", "world.sensor.noise_torque_Nm=0"),
+    *("--set", "world.sensor.bias=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"),
+)
+
+
+def forces_within(port, wanted, within_s=10.0):
+    """Wait until the sensor reads these forces (N), to 0.02 N: it counts in 0.01 N."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        forces = [value / 100.0 for value in registers_of(port)[:3]]
+        if forces == pytest.approx(wanted, abs=0.02):
+            return True
+    raise AssertionError(f"it reads {forces}, not {wanted}")
+
+
+def test_hands_press_and_move_the_arm_by_lines_on_stdin():
+    """0.6 kg weigh 5.886 N; with the last joint at pi/2 the sensor's x points up (docs/frames-and-signs.md)."""
+    where = ("--arm-host", "127.0.42.11", "--base-host", "127.0.42.12", "--base-port", "0")
+    with emulate("all", *where, *QUIET, lines=3, stdin=subprocess.PIPE) as (child, [ft, *_]):
+
+        def say(line):
+            child.stdin.write(line.encode() + b"\n")
+            child.stdin.flush()
+
+        assert forces_within(ft["port"], [-5.69, -1.52, 0.0])
+        say('{"hand": {"force_body_N": [-10, 0, 0], "for_s": 3600}}')
+        assert forces_within(ft["port"], [-5.69, -1.52, -10.0])
+        for nonsense in ("{", "[]", "{}", '{"arm_rad": [1, 2]}', '{"hand": {"force_body_N": [1, 2, 3], "for_s": 0}}',
+                         '{"hand": {"force_body_N": [1e999, 0, 0], "for_s": 1}}', "x" * 10_000):  # fmt: skip
+            say(nonsense)
+        say('{"arm_rad": [1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.5708], "in_s": 0.1}')
+        assert forces_within(ft["port"], [-5.89, 0.0, -10.0])
+        child.stdin.close()
+        assert forces_within(ft["port"], [-5.89, 0.0, -10.0]), "the end of the lines ends nothing"
+        child.send_signal(signal.SIGTERM)
+        assert child.wait(timeout=10) == 0
+        told = child.stderr.read().decode().splitlines()
+    assert len(told) == 7
+    assert told[0].startswith("push: line 2 of stdin is not understood and does nothing: ")
+    assert "neither `hand` nor `arm_rad`" in told[2]
+
+
+def test_a_file_of_lines_is_read_at_once(tmp_path):
+    lines = tmp_path / "lines"
+    lines.write_text('{"hand": {"force_body_N": [-10, 0, 0], "for_s": 3600}}\n')
+    where = ("--arm-host", "127.0.42.13", "--base-host", "127.0.42.14", "--base-port", "0")
+    with lines.open() as file, emulate("all", *where, *QUIET, lines=3, stdin=file) as (_, [ft, *_rest]):
+        assert forces_within(ft["port"], [-5.69, -1.52, -10.0])
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import resource
 import shutil
 import subprocess
 import sys
+from datetime import UTC, datetime, timedelta
 from subprocess import PIPE
 from types import SimpleNamespace
 
@@ -84,6 +85,15 @@ def test_a_machine_that_could_fall_asleep(monkeypatch, tmp_path):
     assert host(monkeypatch)["host.suspend"].result == "warning"
 
 
+def aged(**days):
+    """Return the settings that give a rig calibrations of these ages."""
+    now = datetime.now(UTC)
+    for what, age in days.items():
+        table = f"calibration.{what}"
+        yield from (f"{table}.made={(now - timedelta(days=age)).isoformat()}", f"{table}.uncertainty=1")
+        yield f'{table}.unit="m"'
+
+
 @pytest.mark.parametrize(
     ("settings", "check", "result"),
     [
@@ -95,12 +105,34 @@ def test_a_machine_that_could_fall_asleep(monkeypatch, tmp_path):
         (["control.k_f=0.1", "control.k_y_rad_per_m=0.3"], "rig.gains", "warning"),
         ([], "rig.gains", "ok"),
         ([], "rig.calibration-age", "warning"),
+        ([*aged(frame=29, contact=2)], "rig.calibration-age", "ok"),
+        ([*aged(frame=31, contact=2)], "rig.calibration-age", "warning"),
+        ([*aged(frame=2)], "rig.calibration-age", "warning"),
     ],
 )
 def test_what_the_rig_says_of_itself(settings, check, result):
     row = by_name(rig_checks(resolve_rig("emulated", settings)))[check]
     assert row.result == result, row
     assert bool(row.fix) == (result != "ok")
+
+
+def age_row(*settings):
+    return by_name(rig_checks(resolve_rig("emulated", settings)))["rig.calibration-age"]
+
+
+def test_the_calibrations_that_are_missing_or_old_are_named():
+    both = age_row()
+    assert both.evidence == "never calibrated: the sensor's frame and the contact point"
+    assert (both.value, both.limit, both.unit) == (None, 30.0, "days")
+    one = age_row(*aged(contact=3))
+    assert one.evidence == "never calibrated: the sensor's frame"
+    assert round(one.value, 3) == 3.0
+    old = age_row(*aged(frame=45, contact=3))
+    assert old.evidence == "the sensor's frame was calibrated 45 days ago"
+    assert round(old.value, 3) == 45.0
+    assert age_row(*aged(frame=45, contact=3), "calibration.max_age_days=46").result == "ok"
+    ahead = age_row(*aged(frame=-9, contact=3))
+    assert ahead.evidence == "the calibration of the sensor's frame is dated 9 days ahead of this machine's clock"
 
 
 def test_who_made_a_pty_is_no_other_reader_of_it_and_who_only_opened_it_is():

@@ -1,5 +1,7 @@
 """`done` only where no evidence speaks against it: each piece of evidence at its limit and beyond."""
 
+from datetime import UTC, datetime
+
 import pytest
 
 from robot_io.rig.config import load_rig
@@ -139,3 +141,30 @@ def test_an_item_has_its_number_beside_its_limit():
     assert (trust["corridor"].value, trust["corridor"].limit, trust["corridor"].unit) == (0.1, 0.5, "m")
     assert (trust["end"].value, trust["end"].limit) == (0.02, 0.3)
     assert (trust["contact_lost_m"].value, trust["contact_lost_m"].limit) == (0.0, 0.2)
+
+
+CALIBRATED = (
+    *("calibration.frame.made=2026-07-01T00:00:00Z", "calibration.frame.uncertainty=1", "calibration.frame.unit=deg"),
+    *("calibration.contact.made=2026-07-20T00:00:00Z", "calibration.contact.uncertainty=1"),
+    "calibration.contact.unit=m",
+)
+
+
+@pytest.mark.parametrize(("day", "says"), [(30, "for"), (31, "for"), (32, "unknown")])
+def test_a_calibration_older_than_its_rig_allows_is_unknown_and_never_against(day, says):
+    """30 days: one of the 1st is too old after the 31st."""
+    ended = datetime(2026, 7, 30, tzinfo=UTC).timestamp() + (day - 30) * 86400
+    trust = gather(load_rig("emulated", CALIBRATED), GOOD, Witness(unanswered=0), ended)
+    [item] = [item for item in trust if item.id == "calibration"]
+    assert (item.says, item.value, item.limit, item.unit) == (says, day - 1, 30.0, "days")
+    assert judge(0, trust) == ("done", 0)
+    assert (item.text == "the sensor's frame was calibrated 31 days ago") == (says == "unknown")
+
+
+def test_a_rig_that_names_no_calibration_is_not_asked_for_its_age():
+    trust = gather(load_rig("emulated"), GOOD, Witness(), 1e9)
+    assert "calibration" not in [item.id for item in trust]
+    some = gather(load_rig("emulated", CALIBRATED[3:]), GOOD, Witness(), datetime(2026, 7, 21, tzinfo=UTC).timestamp())
+    assert [(item.says, item.text) for item in some if item.id == "calibration"] == [
+        ("unknown", "never calibrated: the sensor's frame")
+    ]

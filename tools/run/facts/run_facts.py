@@ -23,7 +23,7 @@ def code_and_machine() -> dict[str, str]:
     }
 
 
-def run_facts(rig: RigConfig, seed: int, *, in_contact: bool) -> dict[str, str]:
+def run_facts(rig: RigConfig, seed: int, *, in_contact: bool, note: str = "") -> dict[str, str]:
     """Return the facts of a run; none differs between two runs of the same code on the same machine."""
     return {
         **code_and_machine(),
@@ -31,6 +31,7 @@ def run_facts(rig: RigConfig, seed: int, *, in_contact: bool) -> dict[str, str]:
         "seed": str(seed),
         "in_contact": str(in_contact),
         **law_facts(rig),
+        **({"note": note} if note else {}),
         **({"faults_injected": "; ".join(rig.faults.inject)} if rig.faults.inject else {}),
         "bounds": json.dumps(bounds_of(rig)),
     }
