@@ -154,16 +154,16 @@ def test_the_old_key_is_read_with_a_note(tmp_path, caplog):
     rig.write_text('extends = "sim"\n[control]\ncontroller = "open-loop"\n', encoding="utf-8")
     with caplog.at_level(logging.WARNING):
         assert load_rig(rig).control.law == "open-loop"
-    assert caplog.messages == [f"{rig}:3: `control.law` is read as `control.law`, which is its name now"]
+    assert caplog.messages == [f"{rig}:3: `control.controller` is read as `control.law`, which is its name now"]
     caplog.clear()
-    assert load_rig("sim", ["control.law=line"]).control.law == "line"
-    assert caplog.messages == ["--set: `control.law` is read as `control.law`, which is its name now"]
+    assert load_rig("sim", ["control.controller=line"]).control.law == "line"
+    assert caplog.messages == ["--set: `control.controller` is read as `control.law`, which is its name now"]
 
 
 def test_both_keys_in_one_file_are_a_mistake(tmp_path):
     rig = tmp_path / "mine.toml"
     rig.write_text('extends = "sim"\n[control]\ncontroller = "open-loop"\nlaw = "line"\n', encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"mine.toml:3: `control.law` is called `control.law` now"):
+    with pytest.raises(ConfigError, match=r"mine.toml:3: `control.controller` is called `control.law` now"):
         load_rig(rig)
 
 
