@@ -30,9 +30,10 @@ from tools.run.facts.bounds import bounds_of, check_room
 from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
 from tools.terminal import verdict
-from tools.terminal.arguments import SEED, name_or_path, named_path, note, number, whole_number
+from tools.terminal.arguments import SEED, named_path, note, number, whole_number
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.terminal.rig_arguments import add_faults, add_rig
 from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
@@ -40,9 +41,7 @@ from tools.verdict.witness import Witness
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push run`."""
-    parser.add_argument(
-        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
-    )
+    add_rig(parser)
     parser.add_argument(
         "--distance-m", type=number(0.001, 1000), metavar="M", help="how far to push, from first contact"
     )
@@ -51,15 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
     )
-    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
-    parser.add_argument(
-        "--fault",
-        dest="faults",
-        action="append",
-        default=[],
-        metavar="WORDS",
-        help='inject a fault, at levels sim and emulated: "ft.frozen at 3 s for 1 s"',
-    )
+    add_faults(parser, 'inject a fault, at levels sim and emulated: "ft.frozen at 10 s for 1 s"')
     parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
     parser.add_argument(
         "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
