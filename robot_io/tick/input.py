@@ -63,6 +63,8 @@ class HostInput(msgspec.Struct, frozen=True, gc=False):
     """CLOCK_BOOTTIME minus CLOCK_MONOTONIC: grows only while this machine is suspended (0 at level sim)."""
     last_tick_ns: int = 0
     """How long the tick before this one took, from its waking to the end of its record (0 at level sim)."""
+    law_ns: int = 0
+    """How long the law's last step took, told once; 0 for a shipped law, and at level sim within the limit."""
 
 
 class TickInput(msgspec.Struct, frozen=True, gc=False):
