@@ -37,6 +37,7 @@ from robot_io.tick import (
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
+PAUSE, GO_ON = b"PC"
 LOG_LOST = b"L"[0]
 """The launcher reports that the recorder can no longer write: treated as if it were gone."""
 BEAT = b"H"[0]
@@ -119,6 +120,7 @@ class ControlLoop:
         self._taken = 0
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator = Operator.NONE
+        self._paused = False
         self._launcher, self._recorder = Silence(), Silence()
         self._consumed = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
@@ -184,14 +186,12 @@ class ControlLoop:
             self._operator_fd = -1
             typed = b"S"
         for key in typed:
-            if key == BEAT:
-                continue
-            if key == LOG_LOST:
+            if key in (PAUSE, GO_ON):
+                self._paused = key == PAUSE
+            elif key == LOG_LOST:
                 self._watch.gone.add("recorder")
-                continue
-            event = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
-            if self._operator != Operator.STOP:
-                self._operator = event
+            elif key != BEAT and self._operator != Operator.STOP:
+                self._operator = OPERATOR_BYTES.get(bytes((key,)), Operator.NONE)
 
     def _on_gone(self, name: str, _events: int) -> None:
         self._watch.gone.add(name)
@@ -279,6 +279,7 @@ class ControlLoop:
             ft_input(readings, self._health, self._taken),
             self._arm_record,
             self._base.read(),
+            self._paused,
         )
 
 

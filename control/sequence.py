@@ -23,6 +23,8 @@ MOST_RESUMES = 3
 OVERDUE_CONTACT_M = 0.5
 """Without contact this far beyond the expected place, the object is considered missing."""
 BACKWARD_RAD = math.pi / 2
+MOVING = (Phase.APPROACH, Phase.PUSH, Phase.LOST, Phase.RETREAT)
+"""Phases that go on only while the base may move. In all others it stands anyway, and they go on while it is held."""
 S = 1e-9
 
 
@@ -31,7 +33,7 @@ def advance(
 ) -> ControlState:
     """Return the state after the phase logic of one tick.
 
-    contact: the ball centre in the WORLD frame. held: the supervisor held the base in the previous tick.
+    contact: the ball centre in the WORLD frame. held: the supervisor held the base in the tick before, or it is paused.
     """
     along = settings.path.along(*contact)
     progress = along - state.contact_from_m if state.contact_seen else 0.0
@@ -41,7 +43,7 @@ def advance(
     state = _note_rest(state, inp)
     state = _note_lost(settings, state, inp, held)
     phase = Phase(state.phase)
-    if held and phase in (Phase.APPROACH, Phase.PUSH, Phase.LOST):
+    if (held and phase in MOVING) or (inp.paused and phase == Phase.LOST_HOLD):
         return _wait(settings, state, inp)
     if phase == Phase.SETTLE:
         return _settle(settings, state, inp, along)
@@ -69,8 +71,8 @@ def _enter(state: ControlState, phase: Phase, now_ns: int, **changes: object) ->
 def _wait(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
     """Suspend the phase's timers while the base is held, so that the speed ramps up again afterwards."""
     since = state.phase_since_ns + round(settings.period_s * (1 + inp.host.skipped) / S)
-    if state.phase == Phase.APPROACH:
-        since = inp.now_ns  # its ramp starts from here
+    if state.phase in (Phase.APPROACH, Phase.RETREAT):
+        since = inp.now_ns  # their ramps start from here
     return replace(state, phase_since_ns=since, ramp_since_ns=inp.now_ns, ramp_from_speed=0.0)
 
 

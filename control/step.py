@@ -22,7 +22,7 @@ class Wanted(msgspec.Struct, frozen=True, gc=False):
 
 
 def step(settings: Settings, state: ControlState, inp: TickInput, *, held: bool = False) -> tuple[ControlState, Wanted]:
-    """Return the state after this tick and the wanted velocity of the base; `held`: whether safety holds the base."""
+    """Return the state after this tick and the wanted velocity of the base; `held`: whether it is held or paused."""
     pose = inp.base.pose
     contact = contact_point_world(pose.x, pose.y, pose.yaw, settings.contact_x, settings.contact_y)
     state = sense(settings, state, inp.ft.readings, pose.yaw, inp.now_ns)

@@ -1,7 +1,8 @@
 """Derives the mode from the active faults, and the end of the run from the mode. Pure; the strongest reaction wins.
 
 Escalation is immediate. De-escalation is one mode a tick, after one clean second, and only where the fault's
-row says that it clears by itself. STOP and DEAD are latched: they end the run.
+row says that it clears by itself. STOP and DEAD are latched: they end the run. A pause by the operator asks for HOLD
+like a fault, but it is none, and every check goes on.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def supervise(
     faults = _after_pause(state, inp, faults)
     new = tuple(str(i) for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in state.latched)
     latched = state.latched + new
-    asked = max(strongest(tuple(faults)), strongest(latched))
+    asked = max(strongest(tuple(faults)), strongest(latched), Mode.HOLD if inp.paused else Mode.SILENT)
     state = replace(state, latched=latched, grace_ticks=1 if _pause(state, inp) else 0)
     mode, state = _next_mode(state, asked, control, inp.now_ns)
     stopping = mode >= Mode.STOP

@@ -88,6 +88,10 @@ class Run:
     def err(self) -> str:
         return (self._files / "err").read_text(errors="replace")
 
+    @property
+    def out(self) -> str:
+        return (self._files / "out").read_text(errors="replace")
+
     def left_files(self) -> list[str]:
         """Return what it left in its folder for temporary files."""
         return sorted(path.name for path in self._files.iterdir() if path.name not in ("out", "err"))

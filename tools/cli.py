@@ -55,6 +55,11 @@ COMMANDS = {
             "push calibrate frame my-rig.toml --cord 0,120,240 --apply my-rig.toml",
         ),
     ),
+    "watch": Command(
+        "tools.commands.watch",
+        "force, arm and base, live; nothing moves",
+        ("push watch emulated", "push watch my-rig.toml --json"),
+    ),
     "replay": Command(
         "tools.commands.replay",
         "re-run a log's ticks and compare every byte",
@@ -62,8 +67,13 @@ COMMANDS = {
     ),
     "report": Command(
         "tools.commands.report",
-        "figures and one self-contained page of a log",
-        ("push report runs/demo/run.mcap", "push report runs/demo/run.mcap --json"),
+        "the page of a run, or one page that compares several",
+        ("push report runs/demo --png", "push report runs/one runs/two --out runs/compared --gif"),
+    ),
+    "view": Command(
+        "tools.commands.view",
+        "layouts for Rerun, Lichtblick and Foxglove; opens one that is installed",
+        ("push view runs/demo", "push view runs/demo --out layouts --json"),
     ),
     "log": Command(
         "tools.commands.log",
@@ -93,6 +103,11 @@ COMMANDS = {
         "show or check a rig with all its values, or a schema for editors",
         ("push config show emulated --set control.k_f=0.1", "push config check my-rig.toml"),
     ),
+    "completion": Command(
+        "tools.completion",
+        "the script by which bash or zsh complete commands and options",
+        ("push completion bash", "push completion zsh"),
+    ),
     "bench sim": Command(
         "tools.commands.bench_sim",
         "measure how much faster than real time level sim is",
@@ -104,6 +119,18 @@ COMMANDS = {
         ("push bench physics", "push bench physics --json"),
     ),
 }
+
+ACTIONS = {
+    "log info": ("push log info runs/demo", "push log info runs/demo --json"),
+    "log cat": ("push log cat runs/demo --topics /safety/event", "push log cat runs/demo | head -3"),
+    "log export": ("push log export runs/demo", "push log export runs/demo --topics /ft/wrench --out tables"),
+    "log recover": ("push log recover runs/demo", "push log recover runs/demo --out whole.mcap"),
+    "emulate ft300": ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate ft300 --streaming --latency-ms 16"),
+    "emulate ur10": ("push emulate ur10", "push emulate ur10 --host 127.0.0.11 --json"),
+    "emulate ridgeback": ("push emulate ridgeback", "push emulate ridgeback --port 0 --json"),
+    "emulate all": ("push emulate all", "push emulate all barrel --seed 3 --json"),
+}
+"""Two examples for each action of a command that has some."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -163,11 +190,19 @@ def parser_of(name: str, module: ModuleType) -> Parser:
     parser = Parser(
         prog=f"push {name}",
         description=f"{command.summary[0].upper()}{command.summary[1:]}.",
-        epilog="examples:\n" + "\n".join(f"  {example}" for example in command.examples),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     module.add_arguments(parser)
+    _show_examples(parser, command.examples)
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for word, below in action.choices.items():
+                _show_examples(below, ACTIONS.get(f"{name} {word}", ()))
     return parser
+
+
+def _show_examples(parser: argparse.ArgumentParser, examples: Sequence[str]) -> None:
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = "\n".join(["examples:", *(f"  {example}" for example in examples)])
 
 
 def _overview(argv: Sequence[str]) -> int:

@@ -20,12 +20,17 @@ class RunNotes:
         self.events: list[dict[str, object]] = []
         self.fault_counts: dict[str, int] = {}
         self.course = PushCourse()
+        self.pauses = 0
+        self.paused_ns = 0
         self._last: tuple[str, ...] = ()
+        self._paused_since_ns = 0
         self._first_ns = 0
 
     def note(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
         """Record one tick and the state after it."""
-        self.course.note(after.control.phase, after.control.lateral_m)
+        x, y, _ = after.control.force_world
+        self.course.note(after.control.phase, after.control.lateral_m, math.hypot(x, y))
+        self._note_pause(inp)
         if not self._first_ns:
             self._first_ns = inp.now_ns
         for fault in output.faults:
@@ -44,7 +49,19 @@ class RunNotes:
 
     def figures(self) -> dict[str, object]:
         """Return the notes as part of a run's figures."""
-        return {"events": self.events, "fault_counts": self.fault_counts, **self.course.figures()}
+        pauses = {"pauses": self.pauses, "paused_s": round(self.paused_ns * 1e-9, 2)}
+        return {"events": self.events, "fault_counts": self.fault_counts, **pauses, **self.course.figures()}
+
+    def _note_pause(self, inp: TickInput) -> None:
+        """Count the operator's pauses and how long they were."""
+        if not inp.paused:
+            self._paused_since_ns = 0
+            return
+        if self._paused_since_ns:
+            self.paused_ns += inp.now_ns - self._paused_since_ns
+        else:
+            self.pauses += 1
+        self._paused_since_ns = inp.now_ns
 
 
 def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
@@ -58,6 +75,7 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "faults": list(output.faults),
         "distance_m": control.end_progress_m if ended else control.progress_m,
         "lateral_error_m": control.end_lateral_m if ended else control.lateral_m,
+        "first_tick_ns": safety.first_ns,
         "first_fault": safety.first_fault,
         "first_value": safety.first_value if math.isfinite(safety.first_value) else None,
         "first_fault_s": (safety.first_fault_ns - safety.first_ns) * 1e-9 if safety.first_fault else None,

@@ -28,7 +28,7 @@ class LoopTiming(msgspec.Struct, frozen=True, gc=False):
 
 
 class SafetyEvent(msgspec.Struct, frozen=True, gc=False):
-    """A change of mode, or a fault that came or went; `kind` is "mode", "fault", "cleared" or "injected"."""
+    """What changed; `kind`: "mode", "fault" and "cleared" (a fault came, went), "operator" (a pause) or "injected"."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/SafetyEvent"
     header: Header

@@ -143,23 +143,35 @@ class RidgebackLook:
         Ends after `least_s` when every topic that is needed has spoken and `until` (called ten times a second and more)
         is true, at the latest after `most_s`.
         """
-        intake = Intake(self._reader, self._clock)
         samples: list[Stamped[BaseFeed]] = []
         began_ns = self._clock()
-        try:
-            for topic, type_name in {**self.feeds, self.command: self._command_type}.items():
-                self._link.send_text(encode_subscribe(topic, type_name))
-            while (now_ns := self._clock()) - began_ns < most_s * NS_PER_S:
-                over = until() and now_ns - began_ns > least_s * NS_PER_S
-                if over and not self._reader.silent_topics():
-                    break
-                self._link.wait_readable(now_ns + NS_PER_S // 10)
-                samples += intake.take(self._link)
-        except LinkLost as lost:
-            raise self._gone(lost) from lost
+        intake = self.subscribe()
+        while (now_ns := self._clock()) - began_ns < most_s * NS_PER_S:
+            over = until() and now_ns - began_ns > least_s * NS_PER_S
+            if over and not self._reader.silent_topics():
+                break
+            samples += self.heard_by(intake, now_ns + NS_PER_S // 10)
         span_s = (self._clock() - began_ns) / NS_PER_S
         why = {topic: intake.refused.reason_of(topic) for topic in self._reader.silent_topics()}
         return Heard(tuple(samples), span_s, self._reader.pose_frame, why)
+
+    def subscribe(self) -> Intake:
+        """Ask for everything, also for what others command; return what `heard_by` takes it in with."""
+        intake = Intake(self._reader, self._clock)
+        try:
+            for topic, type_name in {**self.feeds, self.command: self._command_type}.items():
+                self._link.send_text(encode_subscribe(topic, type_name))
+        except LinkLost as lost:
+            raise self._gone(lost) from lost
+        return intake
+
+    def heard_by(self, intake: Intake, until_ns: int) -> list[Stamped[BaseFeed]]:
+        """Return what has come, after waiting for something until `until_ns` at the latest."""
+        try:
+            self._link.wait_readable(until_ns)
+            return intake.take(self._link)
+        except LinkLost as lost:
+            raise self._gone(lost) from lost
 
     def _ask(self, service: str, arguments: dict[str, str]) -> bytes | None:
         """Return the values of an answer; None where none comes within 1 s, or the call fails."""

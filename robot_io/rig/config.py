@@ -231,18 +231,20 @@ def rig_to_toml(rig: RigConfig) -> str:
     return toml_text.emit(msgspec.to_builtins(rig))
 
 
-def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = ()) -> RigConfig:
-    """Read what `rig_to_toml` wrote, with `key=value` settings laid over it.
+def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = (), *, option: str = "--set") -> RigConfig:
+    """Read what `rig_to_toml` wrote, with `key=value` settings of a command's `option` laid over it.
 
     Raises ConfigError (with `name` as its place) when it is anything else, and as `load_rig` for the settings.
     """
     data, origins = toml_text.parse(text, name)
-    _lay_over(data, origins, overrides)
+    _lay_over(data, origins, overrides, option)
     return build(RigConfig, data, origins, name)
 
 
-def _lay_over(data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str]) -> None:
+def _lay_over(
+    data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str], option: str = "--set"
+) -> None:
     for setting in overrides:
-        key, value = toml_text.parse_setting(setting)
-        toml_text.put(data, key, value)
-        origins[key] = f"--set {'.'.join(key)}"
+        key, value = toml_text.parse_setting(setting, option)
+        toml_text.put(data, key, value, option)
+        origins[key] = f"{option} {'.'.join(key)}"

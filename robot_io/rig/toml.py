@@ -15,7 +15,7 @@ from robot_io.errors import ConfigError, UsageError
 
 KeyPath = tuple[str, ...]
 Origins = dict[KeyPath, str]
-"""Where each key was written: `file:line`, or `--set key`."""
+"""Where each key was written: `file:line`, or the option and the key."""
 
 _MOST_CHARACTERS = 64 << 10
 _MOST_DOTS = 200
@@ -71,13 +71,16 @@ def _split(dotted: str) -> KeyPath:
     return tuple(part.strip(" \t\"'") for part in dotted.split("."))
 
 
-def parse_setting(setting: str) -> tuple[KeyPath, Any]:
-    """Read `a.b=value`: the value is TOML; what is not TOML is a plain string. UsageError without a key or `=`."""
+def parse_setting(setting: str, option: str = "--set") -> tuple[KeyPath, Any]:
+    """Read `a.b=value`: the value is TOML; what is not TOML is a plain string. UsageError without a key or `=`.
+
+    option: where it was given, for the error.
+    """
     key, equals, text = setting.partition("=")
     path = _split(key)
     if not equals or not all(path):
         raise UsageError(
-            f"`{setting}` is not of the form key=value", where="--set", do="For example: --set control.k_f=0.1"
+            f"`{setting}` is not of the form key=value", where=option, do=f"For example: {option} control.k_f=0.1"
         )
     text = text.strip()
     try:
@@ -87,13 +90,13 @@ def parse_setting(setting: str) -> tuple[KeyPath, Any]:
     return path, parsed["value"] if len(parsed) == 1 else text
 
 
-def put(data: dict[str, Any], path: KeyPath, value: Any) -> None:
+def put(data: dict[str, Any], path: KeyPath, value: Any, option: str = "--set") -> None:
     """Set `path` of the nested tables `data` to `value`, making the tables on the way; UsageError through a value."""
     table = data
     for depth, part in enumerate(path[:-1], start=1):
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise UsageError(f"`{'.'.join(path[:depth])}` is a value, not a table", where=f"--set {'.'.join(path)}")
+            raise UsageError(f"`{'.'.join(path[:depth])}` is a value, not a table", where=f"{option} {'.'.join(path)}")
     table[path[-1]] = value
 
 

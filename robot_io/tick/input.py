@@ -69,3 +69,5 @@ class TickInput(msgspec.Struct, frozen=True, gc=False):
     ft: FtInput
     arm: ArmRecord
     base: BaseRecord
+    paused: bool = False
+    """Whether the operator has paused the run and not yet let it go on."""

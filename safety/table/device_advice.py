@@ -130,8 +130,8 @@ DEVICE_ADVICE: dict[str, Advice] = {
         "Check the network and the odometry topic on the base.",
     ),
     "F32": Advice(
-        "The network or the bridge is overloaded, so that messages queue up.",
-        "Close other clients of the bridge, or use a cable.",
+        "The network or the bridge is overloaded, so that messages queue up, or the robot's clock was set back.",
+        "Close other clients of the bridge, or use a cable; let its clock be slewed (chrony), not stepped.",
     ),
     "F33": Advice(
         "A stop is pressed, the joystick or another program has priority, wheels slip, or something is in the way.",

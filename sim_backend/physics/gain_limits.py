@@ -75,9 +75,36 @@ def fast_loop_k_f(bodies: Iterable[PushedBody]) -> float:
     The force angle responds to the pushing angle with the slope 1 / (a^2 + rho (rho + L) / d^2), and the law feeds it
     back with k_f + 1: their product must stay below 1.
     """
-    return min(
-        body.along_over_across**2 + body.rho_m * (body.rho_m + body.shift_m) / body.d_m**2 - 1 for body in bodies
-    )
+    return min(1 / _slope(body) - 1 for body in bodies)
+
+
+def decay_per_m(bodies: Iterable[PushedBody], k_f: float, k_y_rad_per_m: float) -> float:
+    """Return how fast a disturbance of the straight push decays at least, as a rate per m pushed; 0: it may not decay.
+
+    The slowest pole over these bodies of the sticking contact and, for a circle, of the frictionless one.
+    """
+    rates = [0.0] if k_f >= fast_loop_k_f(bodies := tuple(bodies)) else []
+    for body in bodies if not rates else ():
+        slope = _slope(body)
+        fast = 1 - (1 + k_f) * slope
+        rates.append(
+            _slowest(
+                (sticking_limit(body, k_f) - k_y_rad_per_m) / fast, k_y_rad_per_m * (1 - slope) / fast / body.rho_m
+            )
+        )
+        if body.round:
+            rates.append(_slowest(frictionless_limit(body, k_f) - k_y_rad_per_m, k_y_rad_per_m / body.rho_m))
+    return max(min(rates), 0.0)
+
+
+def _slowest(damping: float, stiffness: float) -> float:
+    """Return the smaller decay of the roots of L^2 + damping L + stiffness = 0."""
+    return (damping - sqrt(max(damping * damping - 4 * stiffness, 0.0))) / 2
+
+
+def _slope(body: PushedBody) -> float:
+    """Return by how much the force angle answers the pushing angle while the contact sticks."""
+    return 1 / (body.along_over_across**2 + body.rho_m * (body.rho_m + body.shift_m) / body.d_m**2)
 
 
 def offset_per_degree_m(k_f: float, k_y_rad_per_m: float) -> float:

@@ -46,6 +46,7 @@ class ClosedLoop:
         self.output: TickOutput | None = None
         self.tick = 0
         self.operator = Operator.NONE
+        self.paused = False
         self.gate = GateState()
         self._gate_limits = self.core.safety.envelope
         self._ft_period_ns = 1e9 / ft_rate_hz
@@ -122,6 +123,7 @@ class ClosedLoop:
                 sent=self._sent,
                 published_ns=now_ns,
             ),
+            self.paused,
         )
 
     def _readings(self, now_ns: int) -> tuple[FtReading, ...]:

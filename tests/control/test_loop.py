@@ -66,6 +66,13 @@ def test_the_next_tick_hears_the_operator_once_and_a_stop_above_all(bench, typed
     assert heard == [operator, Operator.NONE]
 
 
+@pytest.mark.parametrize(("typed", "paused"), [(b"P", True), (b"PC", False), (b"PCP", True), (b"HPR", True)])
+def test_a_pause_lasts_until_it_is_taken_back(bench, typed, paused):
+    os.write(bench.told, typed)
+    bench.loop._on_operator(0)
+    assert [bench.loop._input(0, 0, 0).paused for _ in range(3)] == [paused] * 3
+
+
 def test_a_launcher_that_is_gone_is_a_stop(bench):
     bench.loop._loop.add_fd(bench.loop._operator_fd, bench.loop._on_operator)
     os.close(bench.told)

@@ -18,6 +18,9 @@ from tools.rig import resolve_rig
 ROOT = Path(__file__).parents[2]
 ROW = re.compile(r"^(?:ok|warning|failed|skipped) +([a-z]+\.[a-z-]+)", re.MULTILINE)
 
+UNTIL_ENDED = ("timeout", "--preserve-status", "--signal=INT", "8")
+"""What goes on until the operator ends it, ends with the program's own exit code."""
+
 
 def commands():
     """Return each command of the page and what is shown below it."""
@@ -43,8 +46,9 @@ def test_every_command_prints_what_the_page_shows(tmp_path):
         )
         for command, shown in commands():
             quick = QUICK if "--distance-m" in command else ()
+            until_ended = UNTIL_ENDED if command.startswith("push watch") else ()
             done = subprocess.run(
-                [PUSH, *shlex.split(command)[1:], *quick],
+                [*until_ended, PUSH, *shlex.split(command)[1:], *quick],
                 cwd=tmp_path, env=os.environ | {"XDG_STATE_HOME": str(tmp_path)}, stdin=subprocess.DEVNULL,
                 capture_output=True, text=True, timeout=90, check=False,
             )  # fmt: skip

@@ -243,6 +243,9 @@ def test_all_devices_gone_at_once(state, tmp_path, host):
     faults = set(found.ended.last_object["faults"])
     assert faults & {"F30", "F02", "F24-stop", "F69"}
     assert [note for note in found.ended.last_object["notes"] if "emulators" in note]
+    assert found.ended.last_object["first_fault"]["id"] == "emulators"
+    assert "safety stop after" in found.ended.err
+    assert ": the emulators have ended, and with them every emulated device at " in found.ended.err
 
 
 @pytest.mark.long

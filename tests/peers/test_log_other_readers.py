@@ -34,6 +34,7 @@ from tools.log.run_log import RunLog
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(600)]
 TICKS = 1000
+ROOT = Path(__file__).resolve().parents[2]
 
 NODE_READER = """
 import { readFileSync } from "node:fs";
@@ -166,6 +167,17 @@ def test_rerun_checks_converts_and_recovers(log, cut, python_reader, tmp_path):
     told = run(rerun, "mcap", "info", "--recover", cut, cwd=tmp_path)
     saved = recover(cut, tmp_path / "ours.mcap")
     assert int(re.search(r"Messages\s+(\d+)", told)[1]) == saved.messages
+
+
+def test_rerun_takes_our_blueprint_and_makes_it_again(python_reader, tmp_path, monkeypatch):
+    rerun = python_reader("rerun-sdk==0.41.0", "rerun")
+    run(rerun, "analytics", "disable", cwd=tmp_path)
+    shipped, again = ROOT / "tools/view/push.rbl", tmp_path / "push.rbl"
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    run(rerun.with_name("python"), "-m", "tools.dev.rerun_blueprint", again, cwd=tmp_path)
+    assert (tmp_path / "push.rbl.txt").read_text() == (ROOT / "tools/view/push.rbl.txt").read_text()
+    for blueprint in (shipped, again):
+        assert "verified without error" in run(rerun, "rrd", "verify", blueprint, cwd=tmp_path)
 
 
 def test_pybag_reads_and_recovers_as_many_messages_as_we_do(log, cut, python_reader, tmp_path):

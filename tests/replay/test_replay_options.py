@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import pytest
 from msgspec.structs import replace
 
-from tests.replay.runs import replayed, rewritten, ticks_in
+from tests.replay.runs import replayed, rewritten
 from tools.cli import main
 from tools.replay.difference import difference
 
@@ -123,22 +122,3 @@ def test_differences_are_by_bits_or_by_tolerance():
     assert differ(math.inf, 1.0, 1e9)
     assert differ(1.0, math.nan, 1e9)
     assert differ(1, 2, 5.0)
-
-
-def test_what_if_tells_what_other_gains_would_have_commanded(sim_log, capsys):
-    code, told = replayed(capsys, sim_log, "--what-if", "control.k_f=0.1")
-    assert code == 0
-    assert told["ticks"] == len(ticks_in(sim_log))
-    assert 0 < told["changed"] < told["ticks"]
-    assert 0 < told["worst_m_per_s"] < 0.2
-    assert told["worst_tick"] >= 0
-    code, told = replayed(capsys, sim_log, "--what-if", "control.k_f=0.3")
-    assert (code, told["changed"], told["worst_tick"]) == (0, 0, -1)
-
-
-@pytest.mark.parametrize("setting", ["control.k_g=0.1", "control.k_f=fast", "k_f", "control.k_f"])
-def test_what_if_of_an_unknown_setting_is_usage(setting, sim_log, capsys):
-    code, told = replayed(capsys, sim_log, "--what-if", setting)
-    assert code == 2
-    assert json.dumps(told)
-    assert told["error"]["what"]

@@ -138,6 +138,27 @@ def test_clocks_that_drift_by_500_ppm_are_no_lag():
     assert heard(lambda ms: 5.0 - 490e-6 * ms, 600_000).growth_ns < 2 * MS
 
 
+def stepped(back_ms: float, at_ms: int = 3_000):
+    """Return ages on the way of 5 ms, by a robot's clock that is set back at a moment (a negative time: forward)."""
+    return lambda ms: 5.0 if ms < at_ms else 5.0 + back_ms
+
+
+@pytest.mark.parametrize(("back_ms", "limit_ms"), [(70.0, 60.0), (130.0, 120.0), (3_600_000.0, 120.0)])
+def test_a_robots_clock_that_is_set_back_looks_like_a_lag_and_slows_or_stops(back_ms, limit_ms):
+    """Its stamps say that all messages are old: whether they are cannot be known any more."""
+    assert first_above(limit_ms, stepped(back_ms)) == 3_040
+
+
+def test_a_robots_clock_that_is_set_forward_is_no_lag_and_a_lag_behind_it_is_still_seen():
+    assert heard(stepped(-5_000.0), 20_000).growth_ns < MS
+    assert heard(lambda ms: stepped(-5_000.0)(ms) + (130.0 if ms >= 10_000 else 0.0), 10_100).growth_ns > 120 * MS
+
+
+def test_a_clock_that_is_set_forward_and_back_again_stops():
+    there_and_back = heard(lambda ms: 5.0 - (5_000.0 if 3_000 <= ms < 4_000 else 0.0), 4_100)
+    assert there_and_back.growth_ns > 120 * MS
+
+
 @pytest.mark.parametrize("stamp_s", [math.nan, math.inf, 0.0, -1.0])
 def test_a_message_without_a_stamp_is_left_out(stamp_s):
     lag = heard(lambda _: 5.0, 2_000)
@@ -176,3 +197,16 @@ def test_on_the_wire(tmp_path):
         gate.tell_until(BodyTwist(), lambda: gate.link.read().lag_ns > 60 * MS)
         gate.tell_for(BodyTwist(), 100)
         assert 60 * MS < gate.link.read().lag_ns < 130 * MS
+
+
+@repeated_when_the_host_stalls
+def test_a_robots_clock_set_back_by_a_quarter_of_a_second_is_told_to_control_on_the_wire(tmp_path):
+    """As a time server does that steps instead of slewing; F32-stop is above 120 ms."""
+    with running_bridge() as bridge, contextlib.closing(Gate(bridge.url)) as gate:
+        gate.wait_ready()
+        gate.tell_for(BodyTwist(), 1_300)
+        assert gate.link.read().lag_ns < 40 * MS
+        bridge.do("set_clock", -0.25)
+        gate.tell_until(BodyTwist(), lambda: gate.link.read().lag_ns > 120 * MS)
+        gate.tell_for(BodyTwist(), 100)
+        assert 220 * MS < gate.link.read().lag_ns < 330 * MS

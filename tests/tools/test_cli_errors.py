@@ -1,5 +1,6 @@
 """What the program says and returns when something is wrong, in this process with made-up commands."""
 
+import argparse
 import importlib
 import json
 import os
@@ -132,23 +133,41 @@ def test_values_with_minus_and_near_misses(fake, capsys):
     assert "`push run`" in capsys.readouterr().err
 
 
-def test_every_command_of_this_build_has_help_with_two_examples(capsys):
-    for name in cli.COMMANDS:
-        with pytest.raises(SystemExit) as done:
-            cli.main([*name.split(), "--help"])
-        assert done.value.code == 0
-        shown = capsys.readouterr().out
-        assert shown.startswith(f"usage: push {name}")
-        assert sum(line.startswith(f"  push {name}") for line in shown.splitlines()) >= 2, name
+def helps():
+    """Return every command, and every action of those that have some, by its words."""
+    words = list(cli.COMMANDS)
+    for name, command in cli.COMMANDS.items():
+        parser = cli.parser_of(name, importlib.import_module(command.module))
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                words += [f"{name} {word}" for word in action.choices]
+    return words
 
 
-@pytest.mark.parametrize("name", sorted(cli.COMMANDS))
-def test_the_examples_are_commands_that_parse(name):
+def examples_of(words, capsys):
+    """Return the examples that `push WORDS --help` shows."""
+    with pytest.raises(SystemExit) as done:
+        cli.main([*words.split(), "--help"])
+    assert done.value.code == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(f"usage: push {words}")
+    return [line.strip() for line in shown.split("examples:\n")[1].splitlines()]
+
+
+@pytest.mark.parametrize("words", helps())
+def test_every_help_has_two_examples_that_parse(words, capsys):
+    shown = examples_of(words, capsys)
+    assert len(set(shown)) == 2
+    name = max((name for name in cli.COMMANDS if f"{words} ".startswith(f"{name} ")), key=len)
     parser = cli.parser_of(name, importlib.import_module(cli.COMMANDS[name].module))
-    for example in cli.COMMANDS[name].examples:
-        words = shlex.split(example)
-        assert words[: 1 + len(name.split())] == ["push", *name.split()]
-        parser.parse_args(words[1 + len(name.split()) :])
+    for example in shown:
+        argv = shlex.split(example.split(" | ")[0])
+        assert argv[: 1 + len(words.split())] == ["push", *words.split()]
+        parser.parse_args(argv[1 + len(name.split()) :])
+
+
+def test_no_examples_are_left_of_an_action_that_is_gone():
+    assert set(cli.ACTIONS) <= set(helps())
 
 
 def test_the_overview_loads_nothing_that_takes_long():

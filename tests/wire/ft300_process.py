@@ -23,7 +23,6 @@ from typing import Any
 from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.ft300.knobs import Ft300Knobs
-from sim_backend.ft300.standalone import ConstantWrench
 
 ROOT = Path(__file__).parents[2]
 START_LIMIT_S = 20.0
@@ -40,6 +39,16 @@ class Ramp:
     def read_ft(self, t_ns: int) -> tuple[float, float, float, float, float, float]:
         self.reads += 1
         return (self.reads % 20000) / 100, -56.78, 100.0, 0.1, -1.23, 3.21
+
+
+class Pressed:
+    """A source with a constant wrench, until told another."""
+
+    def __init__(self, wrench: tuple[float, ...]) -> None:
+        self.wrench = wrench
+
+    def read_ft(self, t_ns: int) -> tuple[float, ...]:
+        return self.wrench
 
 
 class EmulatorProcess:
@@ -106,7 +115,7 @@ def until(condition: Any, limit_s: float = 5.0, pause_s: float = 0.002) -> bool:
 def main(options: dict[str, Any]) -> None:
     loop = EventLoop()
     wrench = tuple(options.pop("wrench", WRENCH))
-    source = Ramp() if options.pop("ramp", False) else ConstantWrench(wrench)
+    source = Ramp() if options.pop("ramp", False) else Pressed(wrench)
     knobs = Ft300Knobs(**options.pop("knobs", {}))
     emulator = Ft300Emulator(loop, source, knobs=knobs, **options)
     emulator.start()
@@ -120,6 +129,8 @@ def main(options: dict[str, Any]) -> None:
             command, *args = json.loads(line)
             if command == "knobs":
                 emulator.knobs = Ft300Knobs(**args[0])
+            elif command == "press" and isinstance(source, Pressed):
+                source.wrench = tuple(args[0])
             elif command in ("stall", "hang_up"):
                 getattr(emulator, command)(*args)
             print(json.dumps({**emulator.counters, "streaming": emulator.streaming}), flush=True)

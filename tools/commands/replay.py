@@ -11,14 +11,13 @@ from typing import Any
 from robot_io.error_report import printable, say_json, tell
 from robot_io.errors import ReplayDiffers
 from robot_io.log.log_format import FORMAT_FACT
-from robot_io.rig.config import rig_from_toml, rig_to_toml
 from tools.places.find_log import find_log
+from tools.replay import what_if_report
 from tools.replay.difference import Difference
 from tools.replay.fold import ReplayResult, replay
-from tools.replay.verified_log import VerifiedLog
+from tools.replay.what_if import what_if
 from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
 from tools.run.facts.run_facts import code_and_machine
-from tools.run.tick_core import TickCore
 from tools.terminal.arguments import named_path, number
 
 DIFFERS = ReplayDiffers.exit_code
@@ -40,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     """Replay; return 0 if identical, 7 if different. Raises LogDamaged (8) for a log that cannot be trusted."""
     path = find_log(args.log)
     if args.what_if:
-        return what_if(path, args)
+        return answer_what_if(path, args)
     result = replay(path, tolerance=args.tolerance)
     for line in lines(result):
         (tell if args.json else print)(printable(line))
@@ -124,40 +123,13 @@ def machine_differences(facts: dict[str, str]) -> list[str]:
     return [f"{name} was {facts[name]}, is {value}" for name, value in now.items() if facts[name] != value]
 
 
-def what_if(path: Path, args: argparse.Namespace) -> int:
-    """Re-run the log's inputs with other settings and print what the law would have commanded."""
-    log = VerifiedLog(path)
-    log.require_config()
-    other = rig_from_toml(rig_to_toml(log.usable_rig()), overrides=args.what_if)
-    core = TickCore.of(other, in_contact=log.in_contact)
-    state = None
-    count = changed = 0
-    worst = 0.0
-    worst_tick = -1
-    for _, _, _, tick in log.messages():
-        if tick is None:
-            continue
-        state, output = core.fold(tick.before[0] if state is None else state, tick.input)
-        old, new = tick.output.wanted_world, output.wanted_world
-        off = math.hypot(old.vx - new.vx, old.vy - new.vy)
-        count += 1
-        changed += off > 0.0
-        if off > worst:
-            worst, worst_tick = off, tick.input.tick
-    show = tell if args.json else print
-    show(f"what if {', '.join(args.what_if)}: the commands the law would have given; the world does not react to them")
-    show(f"{changed} of {count} ticks would differ, at most by {worst:.4f} m/s (tick {worst_tick})")
+def answer_what_if(path: Path, args: argparse.Namespace) -> int:
+    """Re-run the log's inputs with other settings and say what would differ."""
+    result = what_if(path, args.what_if)
+    for line in what_if_report.lines(result):
+        (tell if args.json else print)(printable(line))
     if args.json:
-        say_json(
-            {
-                "schema": 1,
-                "what_if": args.what_if,
-                "ticks": count,
-                "changed": changed,
-                "worst_m_per_s": worst,
-                "worst_tick": worst_tick,
-            }
-        )
+        say_json(what_if_report.as_json(result))
     return 0
 
 

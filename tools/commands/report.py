@@ -1,40 +1,53 @@
-"""`push report LOG|DIR`: recreate the page of a run from its log, or draw several runs in one picture."""
+"""`push report LOG|DIR...`: the page of a run from its log, or one page that compares several runs."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robot_io.error_report import SCHEMA, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
-from tools.places.find_log import find_log
 from tools.terminal.arguments import named_path
 
-PNG_NAMES = ("trajectory", "force", "speed", "tracking", "timing", "safety")
+if TYPE_CHECKING:
+    from tools.report.compare.given_runs import ComparedRun
+
+FILMS = ("film.gif", "film.mp4")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push report`."""
-    parser.add_argument("log", nargs="+", type=named_path, help="run.mcap, or a run's folder; several with --compare")
     parser.add_argument(
-        "--out", type=named_path, metavar="DIR", help="folder for report.html (default: beside the log)"
+        "log", nargs="+", type=named_path, help="run.mcap, a run's folder or a folder of trials; several are compared"
     )
+    parser.add_argument(
+        "--out", type=named_path, metavar="DIR",
+        help="folder to write to (default: beside the log; for several runs compare-TIME)",
+    )  # fmt: skip
     parser.add_argument("--png", action="store_true", help="also write the figures as PNG files")
     parser.add_argument(
-        "--compare", type=named_path, metavar="PNG", help="draw the plan view of all logs into this new picture"
+        "--gif", action="store_true", help="also write film.gif: the pushes from above, four times as fast"
     )
+    parser.add_argument("--mp4", action="store_true", help="the same as film.mp4 (needs ffmpeg)")
+    parser.add_argument("--compare", type=named_path, help=argparse.SUPPRESS)
     parser.add_argument("--json", action="store_true", help="the paths written, as one line of JSON, last on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the report or the picture; return 0. Raises UsageError, LogDamaged, EnvironmentFault."""
-    logs = [find_log(log) for log in args.log]
+    """Write the report or the comparison; return 0. Raises UsageError, LogDamaged, EnvironmentFault."""
+    from tools.report.compare.given_runs import logs_of
+
     if args.compare is not None:
-        written = compare(logs, args)
-    elif len(logs) > 1:
-        raise UsageError("more than one log", where="push report", do="Give one, or add --compare PNG")
-    else:
-        written = write_page(logs[0], args)
+        raise UsageError(
+            "--compare is no longer needed", where="push report", do="Several runs are compared; --out names the folder"
+        )
+    if args.mp4:
+        from tools.report.film.mp4 import find_ffmpeg
+
+        find_ffmpeg()
+    logs = logs_of(args.log)
+    written = write_page(logs[0], args) if len(logs) == 1 else compare(logs, args)
     for path in written:
         tell(f"wrote {path}")
     if args.json:
@@ -44,43 +57,42 @@ def run(args: argparse.Namespace) -> int:
 
 
 def write_page(log: Path, args: argparse.Namespace) -> list[Path]:
-    """Write report.html, and with --png the figures; return the paths written."""
+    """Write report.html, with --png the figures, and the films asked for; return the paths written."""
+    from tools.report.compare.given_runs import read_runs
     from tools.report.page import write_report
 
     out: Path = args.out or log.parent
     try:
-        if args.out is not None:
-            out.mkdir(parents=True, exist_ok=True)
-        page = out / "report.html"
-        figures = [out / f"{name}.png" for name in PNG_NAMES] if args.png else []
-        # A picture beside a report belongs to it and may be overwritten with it; any other is kept.
-        existing = [figure for figure in figures if figure.exists() and not page.exists()]
-        if existing:
-            raise UsageError("there is already a file of this name", where=str(existing[0]), do="Give another --out")
-        pngs = write_report(log, page)
-        for figure in figures:
-            figure.write_bytes(pngs[figure.stem])
+        out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise EnvironmentFault(f"the report cannot be written: {error.strerror}", where=str(out)) from None
-    return [page, *figures]
+    kept = [out / name for name in FILMS if (out / name).exists() and not (out / "report.html").exists()]
+    if kept and (args.gif or args.mp4):
+        raise UsageError("there is already a file of this name", where=str(kept[0]), do="Give another --out")
+    written = write_report(log, out / "report.html", png=args.png)
+    return [*written, *(films(read_runs([log]), out, args) if args.gif or args.mp4 else [])]
 
 
 def compare(logs: list[Path], args: argparse.Namespace) -> list[Path]:
-    """Draw the plan view of all logs; return the path written."""
-    from tools.report.plan_view import write_compare
+    """Write the page, picture and table of several runs, and the films asked for; return the paths written."""
+    from tools.report.compare.given_runs import path_notes, read_runs
+    from tools.report.compare.write import folder_for, write_comparison
 
-    if args.out is not None or args.png:
-        raise UsageError(
-            "--compare writes one picture and nothing else", where="push report", do="Leave out --out and --png"
-        )
-    try:
-        write_compare(logs, args.compare)
-    except FileExistsError:
-        raise UsageError(
-            "there is already a file of this name", where=str(args.compare), do="Give another name"
-        ) from None
-    except OSError as error:
-        raise EnvironmentFault(
-            f"the picture cannot be written: {error.strerror}", where=str(args.compare), do="Check the folder"
-        ) from None
-    return [args.compare]
+    runs = read_runs(logs)
+    out = folder_for(args.out)
+    for note in path_notes(runs):
+        tell(note)
+    return [*write_comparison(runs, out, as_png=args.png), *films(runs, out, args)]
+
+
+def films(runs: list[ComparedRun], out: Path, args: argparse.Namespace) -> list[Path]:
+    """Write the films asked for; return their paths."""
+    from tools.report.film.gif import write_gif
+    from tools.report.film.mp4 import write_mp4
+
+    written = []
+    for wanted, name, write in zip((args.gif, args.mp4), FILMS, (write_gif, write_mp4), strict=True):
+        if wanted:
+            write(runs, out / name)
+            written.append(out / name)
+    return written

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
-from robot_io.tick import TickInput, TickOutput, TickState
 from tools.commands.run_outputs import save_tare, write_report, write_summary
+from tools.commands.run_trials import check_trials, run_battery
+from tools.live.arguments import add_live_arguments
+from tools.live.view import check_live, live_view
 from tools.places import run_dir, saved_tare
 from tools.places.device_locks import DeviceLocks
+from tools.places.running import announced
 from tools.places.saved_tare import SavedTare
 from tools.report.process import ReportProcess
 from tools.rig import devices_at, folder_of, resolve_rig, with_faults
@@ -21,9 +25,8 @@ from tools.run.awake import awake
 from tools.run.facts.bounds import bounds_of, check_room
 from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
-from tools.run.run_state import status_line
 from tools.terminal import verdict
-from tools.terminal.arguments import SEED, name_or_path, named_path, number
+from tools.terminal.arguments import SEED, name_or_path, named_path, note, number, whole_number
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
 from tools.verdict.arm_pose import arm_pose_notes
@@ -66,6 +69,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--drive-blind", action="store_true", help="let a real base move although its sensor or arm is emulated"
     )
+    parser.add_argument(
+        "--trials", type=whole_number(1, 1000), metavar="N", help="a battery: N pushes, asking before each, and a table"
+    )
+    parser.add_argument("--note", type=note, default="", metavar="TEXT", help="a remark, kept in log and report")
+    add_live_arguments(parser)
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON, last on stdout")
 
@@ -82,42 +90,70 @@ def run(args: argparse.Namespace) -> int:
 
         as_json = args.json
         return check_only(rig, folder_of(args.rig), as_json=as_json) if args.check else dry_run(rig, as_json=as_json)
-    simulated = bool(devices_at(rig, "sim"))
-    if not simulated:
+    if not devices_at(rig, "sim"):
         tell_levels(rig)
     if not devices_at(rig, "hardware"):
         tell_bounds(rig)
     with DeviceLocks(rig):
         if devices_at(rig, "hardware"):
             prepare(args, rig)
-        out = run_dir.create(args.out, rig.name)
-        early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
-        try:
-            summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
-        except BaseException:
-            if early is not None:
-                early.drop()
-            raise
+        if args.trials:
+            return run_battery(args, rig, lambda one, out: finish(one, *push_once(one, rig, out, saved)))
+        pushed = push_once(args, rig, args.out, saved)
+    summary = finish(args, *pushed)
+    if args.json:
+        with ignoring_output_errors():
+            say_json(summary)
+    return int(summary["exit_code"])
+
+
+def push_once(
+    args: argparse.Namespace, rig: RigConfig, out: Path | None, saved: SavedTare | None
+) -> tuple[dict[str, Any], ReportProcess | None]:
+    """Push, tell the verdict and return the summary, with the process that makes the report where one has begun.
+
+    out: the run's folder, None for a new one.
+    """
+    simulated = bool(devices_at(rig, "sim"))
+    out = run_dir.create(out, rig.name)
+    early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
+    try:
+        summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
+    except BaseException:
+        if early is not None:
+            early.drop()
+        raise
     summary |= {"bounds": bounds_of(rig), "report": None}
     if blind := blind_words(rig):
         summary["notes"].insert(0, blind)
+    say_lines(verdict.person_lines(summary), as_json=args.json)
     write_summary(summary, out)
+    return summary, early
+
+
+def finish(args: argparse.Namespace, summary: dict[str, Any], early: ReportProcess | None) -> dict[str, Any]:
+    """Write the report of a run whose verdict has been told; return its summary. Raises UsageError: an unused fault."""
+    out = Path(summary["out"])
     if not args.no_report:
+        tell("writing the report ...")
         write_report(summary, out, early)
         write_summary(summary, out)
-    unused = unused_faults(summary)
-    with ignoring_output_errors():
-        for line in verdict.person_lines(summary):
-            tell(line) if args.json else print(line)
-        if args.json and not unused:
-            say_json(summary)
-    if unused:
+        if summary["report"]:
+            say_lines([f"report: {summary['report']}"], as_json=args.json)
+    if unused := unused_faults(summary):
         raise UsageError(
             f"the fault `{unused[0]}` changed nothing",
             where="push run",
             do=f"Choose a time within the run; what came of the run is in {out}",
         )
-    return int(summary["exit_code"])
+    return summary
+
+
+def say_lines(lines: list[str], *, as_json: bool) -> None:
+    """Print lines for people at once: on stdout, or on stderr where that is for JSON."""
+    with ignoring_output_errors():
+        for line in lines:
+            tell(line) if as_json else print(line, flush=True)
 
 
 def overrides(args: argparse.Namespace) -> list[str]:
@@ -147,6 +183,10 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
     if args.fast and not devices_at(rig, "sim"):
         raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
     check_room(rig, args.seed)
+    if args.trials and not (args.dry_run or args.check):
+        check_trials(args, rig)
+    if args.live:
+        check_live(args.live_port, fast=args.fast)
 
 
 def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
@@ -169,7 +209,16 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
         allow_descriptors(MOST_DESCRIPTORS)
 
-        launcher = Launcher(rig, out, seed=args.seed, saved=saved, live=LiveLine(rig), kind_folder=folder_of(args.rig))
+        launcher = Launcher(
+            rig,
+            out,
+            seed=args.seed,
+            saved=saved,
+            live=LiveLine(rig),
+            kind_folder=folder_of(args.rig),
+            note=args.note,
+            live_port=args.live_port if args.live else None,
+        )
         with awake():
             figures = launcher.run()
     except BaseException:
@@ -184,6 +233,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         log=launcher.log,
         seed=args.seed,
         level=level_of(rig),
+        note=args.note,
         devices=launcher.devices(figures),
         notes=[*arm_pose_notes(rig, figures), *launcher.notes],
         witness=launcher.witness(figures),
@@ -193,40 +243,39 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
+    """Run level sim, with its live view where one is wanted, and return its summary."""
+    with live_view(args.live_port if args.live else None) as to_view:
+        return lockstep_summary(args, rig, out, saved, to_view)
+
+
+def lockstep_summary(
+    args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None, to_view: socket.socket | None
+) -> dict[str, Any]:
     """Run level sim in this process and return its summary."""
-    from tools.run.lockstep import Lockstep, WallPace, open_log, stop_on_signals
+    from tools.run.lockstep import Lockstep, open_log
+    from tools.run.paced import PacedRun, run_fast
 
     text = run_dir.write_config(out, rig)
-    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None)
+    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
     try:
         one = Lockstep(rig, args.seed, log, saved=saved)
     except PushError:  # an impossible world: nothing has started
         log.abandon()
         run_dir.discard(out)
         raise
-    stop_on_signals(one)
-    live = LiveLine(rig, quiet=args.fast)
-    pace = WallPace(1.0 / rig.loop.rate_hz)
-    every = max(1, round(rig.loop.rate_hz / 5.0))
-
-    def on_tick(inp: TickInput, state: TickState, output: TickOutput) -> None:
-        if not args.fast:
-            pace.wait()
-            if inp.tick % every == 0:
-                live.show(status_line(inp, state, output))
-
+    live = LiveLine(rig)
     try:
         try:
-            figures = one.run(on_tick)
+            with announced(rig, out / "run.mcap"):
+                figures = run_fast(one) if args.fast else PacedRun(one, live).run()
         finally:
+            live.close()
             log.finish({})
     except OSError as error:  # only the log is outside this process here
         log.abandon()
         raise EnvironmentFault(
             f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Free some space"
         ) from None
-    live.end()
-    live.close()
     save_tare(rig, figures)
     summary = verdict.summary(
         rig,
@@ -235,6 +284,7 @@ def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: Sav
         log=out / "run.mcap",
         seed=args.seed,
         level="sim",
+        note=args.note,
         devices=figures["devices"],
         notes=arm_pose_notes(rig, figures),
         witness=Witness(),

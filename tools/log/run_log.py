@@ -6,6 +6,7 @@ every other kind is written unchanged. Topics are declared on first use.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from robot_io.errors import LogDamaged
@@ -29,10 +30,20 @@ class RunLog:
     """One part of a run's log.
 
     config_text: the resolved rig. wall_offset_ns: added to each record's time to get its log time; stored in
-    `metadata`. Raises as `McapLog` and `rig_from_toml`; OSError when writing to disk fails.
+    `metadata`. also: called with topic, log time and payload of each message that was written. Raises as `McapLog` and
+    `rig_from_toml`; OSError when writing to disk fails.
     """
 
-    def __init__(self, path: Path, *, config_text: str, metadata: dict[str, str], wall_offset_ns: int) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        config_text: str,
+        metadata: dict[str, str],
+        wall_offset_ns: int,
+        also: Callable[[str, int, bytes], None] | None = None,
+    ) -> None:
+        self._also = also
         self._derive = Derivation(rig_from_toml(config_text), wall_offset_ns)
         self._offset_ns = wall_offset_ns
         self._log = McapLog(path, config_text=config_text, metadata={**metadata, OFFSET_FACT: str(wall_offset_ns)})
@@ -117,6 +128,8 @@ class RunLog:
             self._object = (self._object[0] if self._object else message.payload, message.payload)
         self._seal.note(message.topic, message.log_time_ns, message.payload)
         self._log.write(message.topic, message.log_time_ns, message.payload)
+        if self._also is not None:
+            self._also(message.topic, message.log_time_ns, message.payload)
 
     def _slider(self, kind: int, log_time_ns: int, payload: bytes) -> None:
         try:

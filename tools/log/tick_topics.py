@@ -72,6 +72,7 @@ class TickTopics:
         self._names = names
         self._faults: tuple[str, ...] = ()
         self._mode = 0
+        self._paused = False
         self._arm_packets = 0
         self._pose_seq = 0
         self._diagnosed_ns: int | None = None
@@ -130,9 +131,12 @@ class TickTopics:
         before = tick.before[0].safety.mode if tick.before else self._mode
         after = self._mode = tick.after.safety.mode
         faults, self._faults, known = tick.output.faults, tick.output.faults, self._faults
-        if faults == known and before == after:
+        paused, self._paused, was_paused = tick.input.paused, tick.input.paused, self._paused
+        if faults == known and before == after and paused == was_paused:
             return []
         events = []
+        if paused != was_paused:
+            events.append(("operator", "", "paused" if paused else "goes on after a pause", _INFO))
         for fault in faults:
             if fault not in known:
                 row = FAULTS.get(fault)

@@ -1,4 +1,4 @@
-"""Which runs of this user are under way, for `push stop`: a file for each, which names its processes.
+"""Which runs of this user are under way, for `push stop` and `push watch`: a file for each, which names its processes.
 
 A process id is used again after its process has ended, so each is kept, and checked, with the time it started.
 """
@@ -8,10 +8,12 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
 
+from robot_io.errors import EnvironmentFault
 from robot_io.rig.config import RigConfig
 from tools.places.atomic_file import write_atomically
 from tools.places.device_locks import resources_of
@@ -43,11 +45,12 @@ class Process(msgspec.Struct, frozen=True):
 
 
 class RunningRun(msgspec.Struct, frozen=True):
-    """A run under way: its rig, the real devices that it holds, and its processes by name."""
+    """A run under way: its rig, the real devices that it holds, its processes by name, and its log."""
 
     rig: str
     devices: tuple[str, ...]
     processes: dict[str, Process]
+    log: str = ""
 
     def alive(self) -> list[str]:
         """Return the names of its processes that still run."""
@@ -63,10 +66,11 @@ def start_time(pid: int) -> int | None:
     return None if fields[0] == "Z" else int(fields[_START_TIME])
 
 
-def announce(rig: RigConfig, pids: dict[str, int]) -> None:
-    """Write down the processes of this process's run. Raises OSError and EnvironmentFault."""
+def announce(rig: RigConfig, pids: dict[str, int], log: Path) -> None:
+    """Write down the processes of this process's run, and its log. Raises OSError and EnvironmentFault."""
     processes = {name: Process(pid, started) for name, pid in pids.items() if (started := start_time(pid)) is not None}
-    run = RunningRun(rig.name, tuple(resource.key for resource in resources_of(rig)), processes)
+    keys = tuple(resource.key for resource in resources_of(rig))
+    run = RunningRun(rig.name, keys, processes, str(log.resolve()))
     _folder().mkdir(mode=0o700, exist_ok=True)
     write_atomically(_folder() / f"{os.getpid()}.json", msgspec.json.encode(run), mode=0o600)
 
@@ -74,6 +78,18 @@ def announce(rig: RigConfig, pids: dict[str, int]) -> None:
 def forget() -> None:
     """Remove what `announce` wrote."""
     (_folder() / f"{os.getpid()}.json").unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def announced(rig: RigConfig, log: Path) -> Iterator[None]:
+    """Have the run of this process alone, at level sim, written down; where that fails, it is only not found."""
+    with contextlib.suppress(OSError, EnvironmentFault):
+        announce(rig, {"launcher": os.getpid()}, log)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError, EnvironmentFault):
+            forget()
 
 
 def running_runs() -> list[RunningRun]:

@@ -14,8 +14,8 @@ from robot_io.rig.files import shipped_rigs
 from robot_io.tick import Phase
 from tools.kinds import device_names
 from tools.report.bounded_series import Floats
+from tools.report.drawing.style import phase_spans
 from tools.report.run_data import RunData
-from tools.report.style import phase_spans
 
 
 def tiles(run: RunData) -> list[tuple[str, str]]:
@@ -53,7 +53,7 @@ def baseline_of(rig: RigConfig) -> str:
 
 def differences(rig: RigConfig, baseline: str) -> list[tuple[str, str, str]]:
     """Return (setting, shipped value, this run's value) for every setting that differs."""
-    ours, theirs = _flat(msgspec.to_builtins(rig)), _flat(msgspec.to_builtins(load_rig(baseline)))
+    ours, theirs = flat_settings(msgspec.to_builtins(rig)), flat_settings(msgspec.to_builtins(load_rig(baseline)))
     names = dict.fromkeys((*theirs, *ours))
     return [
         (name, str(theirs.get(name, "-")), str(ours.get(name, "-")))
@@ -117,10 +117,11 @@ def _largest_deviation(values: Floats) -> float:
     return float(finite[np.argmax(np.abs(finite))]) if len(finite) else math.nan
 
 
-def _flat(tree: Any, name: str = "") -> dict[str, Any]:
+def flat_settings(tree: Any, name: str = "") -> dict[str, Any]:
+    """Return the settings of a rig (as built-in types) by their full names."""
     if not isinstance(tree, dict):
         return {name: tree}
     found: dict[str, Any] = {}
     for key, value in tree.items():
-        found |= _flat(value, f"{name}.{key}" if name else str(key))
+        found |= flat_settings(value, f"{name}.{key}" if name else str(key))
     return found

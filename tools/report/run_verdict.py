@@ -20,12 +20,17 @@ from tools.verdict.witness import Witness
 
 
 class Verdict(NamedTuple):
-    """How the run ended: one line, the reason, whether it is done, and the evidence for and against it."""
+    """How the run ended: one line, the reason, whether it is done, and the evidence for and against it.
+
+    first_fault: the row of the fault table that stopped it, "" where none did. word: the verdict in a word or two.
+    """
 
     line: str
     why: str
     good: bool
     trust: tuple[TrustItem, ...] = ()
+    first_fault: str = ""
+    word: str = "did not start"
 
 
 def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
@@ -46,17 +51,20 @@ def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
             f"The log ends during the run (phase {phase}){': ' + why if why else ''}.",
             False,
             trust,
+            first.id if first else "",
+            "aborted",
         )
     judged = judge(end["exit_code"], trust)
     if end["exit_code"] == 0:
         against = "; ".join(item.text for item in trust if item.says == "against")
         line = f"Pushed {distance}" + (f", {judged.verdict}" if against else "")
         why = f"Lateral error at the end: {lateral}." + (f" Against the run: {against}." if against else "")
-        return Verdict(line, why, not judged.exit_code, trust)
+        return Verdict(line, why, not judged.exit_code, trust, word=judged.verdict)
     if not why and judged.verdict == CONTACT_LOST:
         why = contact_loss_reason(end["contact_seen"]).capitalize()
     why = f"{why or 'See the safety events'}. Lateral offset at the end: {lateral}."
-    return Verdict(f"{judged.verdict.capitalize()} after {distance}", why, False, trust)
+    line = f"{judged.verdict.capitalize()} after {distance}"
+    return Verdict(line, why, False, trust, first.id if first else "", judged.verdict)
 
 
 def _without_first(faults: list[str]) -> str:

@@ -2,6 +2,7 @@
 
     emulators   one process with the world and its wire servers (emulated devices only)
     recorder    drains the log rings into run.mcap, finishes it when control has ended
+    live        serves what is recorded to viewers (with --live); nothing depends on it
     gate        sole holder of the base connection
     arm         the ur_rtde library, publishing a shared record
     control     the loop: sensor, law, supervisor, envelope, one frame to the gate per tick
@@ -18,7 +19,7 @@ from typing import Any
 import msgspec
 
 from robot_io.clock import NS_PER_S, monotonic_ns
-from robot_io.errors import OperatorStop, PushError, SafetyStop
+from robot_io.errors import OperatorStop
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import leave_realtime, try_realtime
 from robot_io.ipc.spawn import Child
@@ -27,15 +28,18 @@ from robot_io.rig.config import RigConfig
 from robot_io.rig.fault_words import parse_fault
 from safety.gate import Latch
 from tools.kinds import name_of
+from tools.live.view import where_words
 from tools.places import run_dir
 from tools.places.atomic_file import write_json
 from tools.places.running import announce, forget
 from tools.places.saved_tare import SavedTare
-from tools.run.facts.figures_from_log import figures_from_log
+from tools.run.facts.ended import final_figures
+from tools.run.facts.process_notes import process_notes, warn_without_realtime
 from tools.run.processes import Processes
 from tools.terminal.live_line import LiveLine
 from tools.terminal.operator_keys import OperatorKeys
 from tools.terminal.start_errors import combined_error, start_timeout
+from tools.verdict.first_cause import with_dead_emulators
 from tools.verdict.object_pose import ObjectPose, object_pose
 from tools.verdict.witness import Witness, witness_of
 
@@ -55,7 +59,7 @@ BEAT_NS = NS_PER_S // 10
 """How often control is told that the launcher lives: silent for 0.5 s, the base holds, for 2 s, it stops (F73)."""
 SECOND_STOP_NS = NS_PER_S
 """A second stop counts only this long after the first: `timeout` and shells may send one stop twice."""
-ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0}
+ENDS_WITHIN_S = {"control": 2.0, "gate": 1.5, "emulators": 2.0, "arm": 3.0, "recorder": 5.0, "live": 1.0}
 """Processes in the order in which they end."""
 
 
@@ -63,7 +67,16 @@ class Launcher:
     """One run at level emulated, hardware or a mix; `run` returns its final figures, `notes` holds further remarks."""
 
     def __init__(
-        self, rig: RigConfig, out: Path, *, seed: int, saved: SavedTare | None, live: LiveLine, kind_folder: str
+        self,
+        rig: RigConfig,
+        out: Path,
+        *,
+        seed: int,
+        saved: SavedTare | None,
+        live: LiveLine,
+        kind_folder: str,
+        note: str = "",
+        live_port: int | None = None,
     ) -> None:
         self._rig = rig
         self._out = out
@@ -72,16 +85,24 @@ class Launcher:
         self.log = out / "run.mcap"
         self.notes: list[str] = []
         self._processes = Processes(
-            rig, seed=seed, saved=saved, log=self.log, kind_folder=kind_folder, on_spawn=self._listen
+            rig,
+            seed=seed,
+            saved=saved,
+            log=self.log,
+            kind_folder=kind_folder,
+            note=note,
+            live_port=live_port,
+            on_spawn=self._listen,
         )
         self._children = self._processes.children
-        self._began = self._ending = self._killed_by_operator = False
+        self._began = self._ending = self._paused = self._killed_by_operator = False
         self._stop_asked_ns = self._status_ns = 0
+        self._emulators_died_ns = 0
         self._gate_latch = ""
 
     def run(self) -> dict[str, Any]:
         """Run to the end; return the figures. Raises PushError if the run did not start or its result is unknown."""
-        keys = OperatorKeys(self._loop, self._stop, self._resume)
+        self._keys = keys = OperatorKeys(self._loop, self._stop, self._resume, self._pause)
         self._loop.call_every(BEAT_NS, lambda _: self._processes.send_to_control(b"H"))
         try:
             try:
@@ -91,7 +112,7 @@ class Launcher:
                 self._end()
                 keys.close()
                 self._loop.close()
-            self._note_process_failures()
+            self.notes += process_notes(self._children)
             return self._figures()
         finally:
             self._live.close()
@@ -138,27 +159,24 @@ class Launcher:
         names = self._processes.start_remaining(run_dir.write_config(self._out, self._rig))
         pids = {"launcher": os.getpid(), **self._processes.pids}
         write_json(self._out / "processes.json", {"schema": 1, **pids})
-        announce(self._rig, pids)
+        announce(self._rig, pids, self.log)
         self._wait_ready(names, READY_NS)
-        self._warn_without_realtime()
+        warn_without_realtime(self._children, self._live.say)
         if errors := self._children["recorder"].errors:  # it was ready, and then the disk was full
             raise errors[0]
         self._began = True
-        self._processes.send_to_control(b"G")
-
-    def _warn_without_realtime(self) -> None:
-        plain = [name for name, child in self._children.items() if (child.ready or {}).get("realtime") is False]
-        if plain:
-            self._live.say(f"no permission for real-time priority for {', '.join(plain)}: only 100 Hz is supported")
+        self._processes.send_to_control(b"GP" if self._paused else b"G")
 
     def _listen(self, child: Child) -> None:
         self._loop.add_fd(child.status.fd, lambda _events: self._hear(child))
+        if child.name == "live":
+            self._live.say(where_words(child))
 
     def _hear(self, child: Child) -> None:
         for event in child.hear():
             if event.get("event") == "status":
                 self._status_ns = monotonic_ns()
-                self._live.show(event)
+                self._live.show(event, keys=self._keys.heard)
             elif event.get("event") == "latched" and event["latch"] != Latch.EOF:
                 self._gate_latch = event["text"]
                 self._live.say(f"gate: {event['text']}")
@@ -173,7 +191,10 @@ class Launcher:
         if not child.status.open:
             self._loop.remove_fd(child.status.fd)
             if child.name == "emulators" and not self._ending:
+                self._emulators_died_ns = monotonic_ns()
                 self._live.say("the emulators have ended: every emulated device is gone")
+            elif child.name == "live" and not self._ending:
+                self._live.say("the live view has ended; the run goes on")
 
     def _wait_ready(self, names: list[str], within_ns: int) -> None:
         """Wait until all are ready. Raises PushError naming everything that failed and what to do about each."""
@@ -210,6 +231,7 @@ class Launcher:
         try:
             while control.process.poll() is None:
                 self._loop.run_once(50)
+                self._live.mark_old()
                 allowed_ns = FROZEN_NS if self._gate_latch else FIRST_STATUS_NS if not self._status_ns else None
                 if allowed_ns and monotonic_ns() - (self._status_ns or went_ns) > allowed_ns:
                     control.process.kill()  # the base has its zeros; a frozen control would only delay the end
@@ -232,7 +254,13 @@ class Launcher:
 
     def _resume(self) -> None:
         if self._began:  # before the start, any byte but G and H would end control
-            self._processes.send_to_control(b"R")
+            self._paused = False
+            self._processes.send_to_control(b"CR")
+
+    def _pause(self) -> None:
+        self._paused = not self._paused
+        if self._began:
+            self._processes.send_to_control(b"P" if self._paused else b"C")
 
     # --- end -------------------------------------------------------------------------------------------------
 
@@ -259,40 +287,9 @@ class Launcher:
     def _finished_event(self, name: str) -> dict[str, Any]:
         return self._children[name].finished or {}
 
-    def _note_process_failures(self) -> None:
-        """Note what went wrong in the processes other than control."""
-        for name in ("gate", "emulators", "arm", "recorder"):
-            child = self._children.get(name)
-            if child is not None and child.errors:
-                self.notes.append(f"{name}: {child.errors[-1].what}")
-            elif child is not None and child.process.returncode != 0:
-                self.notes.append(f"the {name} process {child.how_it_ended()}")
-        recorded = self._finished_event("recorder")
-        if not recorded.get("complete", False):
-            self.notes.append("the log is not complete: `push log recover` may repair it")
-        if dropped := sum(recorded.get("dropped", {}).values()):
-            self.notes.append(f"{dropped} records did not fit into the log's ring buffers")
-
     def _figures(self) -> dict[str, Any]:
         """Return control's figures, or those from the log if control could not report them."""
-        control = self._children["control"]
-        if control.finished is not None:
-            figures: dict[str, Any] = control.finished
-            if figures["error"]:
-                self.notes.append(f"{figures['error']}; this is a bug, its traceback is in {control.save_stderr()}")
-            return figures
-        if control.errors:
-            raise control.errors[-1]
-        if self._killed_by_operator:
-            code, how = OperatorStop.exit_code, "was killed by the operator"
-        elif control.process.returncode < 0:
-            code, how = SafetyStop.exit_code, control.how_it_ended()
-        else:
-            code, how = control.process.returncode, f"{control.how_it_ended()}, see {control.save_stderr()}"
-        stopped = f"the control process {how}; the gate stopped the base"
-        try:
-            figures = figures_from_log(self.log, self._rig.loop.rate_hz, code)
-        except PushError as unreadable:
-            raise SafetyStop(stopped, where="control", do=f"Its log does not say more ({unreadable.what})") from None
-        self.notes.append(stopped)
-        return figures
+        rate_hz, killed = self._rig.loop.rate_hz, self._killed_by_operator
+        figures, notes = final_figures(self._children["control"], self.log, rate_hz, killed_by_operator=killed)
+        self.notes += notes
+        return with_dead_emulators(figures, self._emulators_died_ns)

@@ -5,8 +5,7 @@ Two runs with the same rig and seed give identical files: log times start at a f
 
 from __future__ import annotations
 
-import signal
-import time
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -36,6 +35,7 @@ from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
 from tools.kinds import is_shipped, name_of
+from tools.live.feed import LiveFeed
 from tools.log.run_log import RunLog
 from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
@@ -97,6 +97,7 @@ class Lockstep:
         self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
         self.notes = RunNotes()
         self.operator = Operator.NONE
+        self.paused = False
 
     def run(self, on_tick: Callable[[TickInput, TickState, TickOutput], None]) -> dict[str, Any]:
         """Run to the end and return the figures; `on_tick` is called after each tick (to pace and to display)."""
@@ -141,6 +142,7 @@ class Lockstep:
             ft_input(readings, self._ft_edge.health(), 0),
             self._arm_edge.read() or ArmRecord(),
             self._gate.record,
+            self.paused,
         )
         try:
             after, output = self._core.fold(self._state, inp)
@@ -196,10 +198,19 @@ class Lockstep:
         )
 
 
-def open_log(path: Path, config_text: str, seed: int, *, in_contact: bool) -> RunLog:
-    """Open the log of a lockstep run; its facts hold nothing that differs from run to run."""
-    facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact)
-    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS)
+def open_log(
+    path: Path,
+    config_text: str,
+    seed: int,
+    *,
+    in_contact: bool,
+    note: str = "",
+    to_view: socket.socket | None = None,
+) -> RunLog:
+    """Open the log of a lockstep run; its facts hold nothing that differs from run to run. to_view: a live view's."""
+    facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact, note=note)
+    also = LiveFeed(to_view).add if to_view is not None else None
+    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS, also=also)
 
 
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:
@@ -212,26 +223,3 @@ def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:
     return SimFt300(
         world, clock, rate_hz=rate_hz, phase=model.phase, latency_ms=0, resolution=facts.resolution, limit=facts.range
     )
-
-
-class WallPace:
-    """Paces lockstep ticks to the wall clock."""
-
-    def __init__(self, period_s: float) -> None:
-        self._period_s = period_s
-        self._next_s = time.monotonic()
-
-    def wait(self) -> None:
-        """Wait for the next tick's time; late ticks are not caught up in a burst."""
-        self._next_s = max(self._next_s + self._period_s, time.monotonic())
-        time.sleep(max(0.0, self._next_s - time.monotonic()))
-
-
-def stop_on_signals(run: Lockstep) -> None:
-    """Make SIGINT, SIGTERM and SIGHUP act as the operator's stop."""
-
-    def ask(*_: object) -> None:
-        run.operator = Operator.STOP
-
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, ask)

@@ -7,7 +7,8 @@
     records            gate -> control, arm -> control               memfd, newest wins
     pidfds             gate, arm, recorder -> control                readable when the process has ended
     run pipe           control -> arm, emulators                     nothing is written: EOF means control has ended
-    operator pipe      launcher -> control                           a byte each: go, stop, resume, log failed, alive
+     live feed          recorder -> live                              SEQPACKET, with --live; drops, nobody waits
+     operator pipe      launcher -> control                           a byte each: go, stop, pause, ..., alive
     status pipes       each of them -> launcher                      JSON lines
 
 A copy of an inherited descriptor left open in the launcher would hide the end of the process that holds it, so all
@@ -24,7 +25,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
 from robot_io.clock import wall_offset_ns
 from robot_io.ipc.record import ARM_RECORD, BASE_RECORD, TypedRecord
@@ -37,6 +38,7 @@ from safety.gate_process import GateJob
 from safety.motion_bounds import total_bounds
 from safety.settings import SafetySettings
 from tools.kinds import is_shipped
+from tools.live.view import start_live
 from tools.places.saved_tare import SavedTare
 from tools.rig import devices_at, faults_of, with_addresses
 from tools.run.facts.run_facts import run_facts
@@ -56,9 +58,9 @@ MOST_DESCRIPTORS = 128
 class Processes:
     """Starts the processes of one run, by `start_emulators` and `start_remaining`; `children` has them by name.
 
-    saved: the tare of a run that starts in contact. log: where the recorder writes.
-    kind_folder: another place to look for modules of the rig's kinds. on_spawn: called
-    with each child as soon as it has been started.
+    saved: the tare of a run that starts in contact. log: where the recorder writes. note: the operator's, for the log.
+    kind_folder: another place to look for modules of the rig's kinds. live_port: where to serve a live view, None for
+    none. on_spawn: called with each child as soon as it has been started.
     """
 
     def __init__(
@@ -69,6 +71,8 @@ class Processes:
         saved: SavedTare | None,
         log: Path,
         kind_folder: str,
+        note: str,
+        live_port: int | None,
         on_spawn: Callable[[Child], None],
     ) -> None:
         self._rig = rig
@@ -76,6 +80,8 @@ class Processes:
         self._saved = saved
         self._log = log
         self._kind_folder = kind_folder
+        self._note = note
+        self._live_port = live_port
         self._on_spawn = on_spawn
         self._offset_ns = wall_offset_ns()
         self._rings = {name: Ring.create(f"{name}-log", size) for name, size in RING_BYTES.items()}
@@ -130,7 +136,10 @@ class Processes:
         return ["recorder", "gate", "arm", "control"]
 
     def send_to_control(self, key: bytes) -> None:
-        """Send G (go), S (stop), R (resume), L (log failed) or H (alive) to control; ignored if it is not running."""
+        """Send bytes to control: G (go), S (stop), R (resume), P (pause), C (continue), L (log failed), H (alive).
+
+        Ignored if it is not running.
+        """
         if self._operator_fd >= 0:
             with contextlib.suppress(OSError):
                 os.write(self._operator_fd, key)
@@ -155,12 +164,20 @@ class Processes:
         return with_addresses(self._rig, ready.get("addresses", {}))
 
     def _start_recorder(self, config_text: str) -> None:
-        facts = run_facts(self._rig, self._seed, in_contact=self._saved is not None)
+        facts = run_facts(self._rig, self._seed, in_contact=self._saved is not None, note=self._note)
         facts["kernel"] = platform.release()
         rings = [RingSource(name, ring.fd) for name, ring in self._rings.items()]
         alive = [self._alive[name][0] for name in ("control", "gate", "world")]
         job = RecorderJob(str(self._log), config_text, facts, self._offset_ns, rings, alive, -1)
-        self._spawn("recorder", "tools.run.recorder", job, [*(ring.fd for ring in rings), *alive])
+        fds = [*(ring.fd for ring in rings), *alive]
+        if self._live_port is None:
+            self._spawn("recorder", "tools.run.recorder", job, fds)
+            return
+        child, feed = start_live(self._live_port)
+        self._adopt(child)
+        with feed:
+            job = replace(job, live_fd=feed.fileno())
+            self._spawn("recorder", "tools.run.recorder", job, [*fds, feed.fileno()])
 
     def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
         limits = SafetySettings.of(rig).envelope

@@ -3,10 +3,11 @@
     python -m tools.run.recorder  < one line of JSON: {
         "out_path": "DIR/run.mcap", "config_text": "...", "metadata": {"seed": "0"}, "wall_offset_ns": N,
         "rings": [{"name": "control", "fd": 5}, {"name": "gate", "fd": 6}, {"name": "world", "fd": 7}],
-        "alive_fds": [8, 9, 10], "status_fd": 11}
+        "alive_fds": [8, 9, 10], "status_fd": 11, "live_fd": 12}
 
 `alive_fds` are read ends of pipes, one for each ring and in the same order; only the producer holds the write end, so
 EOF means it has ended. The first is control's: its EOF ends the run. The others then have 1.5 s to end.
+`live_fd` leads to the live view, -1 where there is none; nothing waits for it.
 
 There is no other way to stop it: SIGINT, SIGTERM and SIGHUP are ignored, because a signal to the process group
 would truncate the log. On `status_fd` it reports "ready", "error" and "finished" (`robot_io.ipc.status`).
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 from functools import partial
 from pathlib import Path
@@ -29,6 +31,7 @@ from robot_io.errors import EnvironmentFault, LogDamaged, PushError
 from robot_io.ipc.event_loop import HANGUP, READ, EventLoop
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
+from tools.live.feed import LiveFeed
 from tools.log.run_log import RunLog
 
 POLL_NS = 20 * NS_PER_MS
@@ -56,6 +59,7 @@ class Job(msgspec.Struct, frozen=True):
     rings: list[RingSource]
     alive_fds: list[int]
     status_fd: int
+    live_fd: int = -1
 
 
 class Recorder:
@@ -71,11 +75,13 @@ class Recorder:
         self._disk_failed = False
         self._control_gone_ns: int | None = None
         self._loop = EventLoop()
+        self._live = LiveFeed(socket.socket(fileno=job.live_fd)) if job.live_fd >= 0 else None
         self._log = RunLog(
             Path(job.out_path),
             config_text=job.config_text,
             metadata=job.metadata,
             wall_offset_ns=job.wall_offset_ns,
+            also=self._live.add if self._live is not None else None,
         )
 
     def run(self) -> int:
@@ -124,6 +130,8 @@ class Recorder:
             self._counts[name] += len(records)
             for kind, time_ns, payload in records:
                 self._write(kind, time_ns, payload)
+        if self._live is not None:
+            self._live.flush()
         return found
 
     def _write(self, kind: int, time_ns: int, payload: bytes) -> None:
@@ -168,6 +176,7 @@ class Recorder:
             lost=self._lost,
             undecodable=self._log.undecodable,
             object_poses=self._log.object_poses,
+            live=self._live.counts() if self._live is not None else None,
         )
 
 

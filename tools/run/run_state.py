@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from control.sequence import FRESH_NS
 from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState
 from tools.places.saved_tare import SavedTare
 
@@ -21,6 +22,8 @@ def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[st
         "tick": inp.tick,
         "phase": Phase(control.phase).name,
         "mode": Mode(output.mode).name,
+        "paused": inp.paused,
+        "old": _old(inp, state),
         "progress_m": round(control.progress_m, 4),
         "lateral_m": round(control.lateral_m, 4),
         "force_N": [round(value, 2) for value in control.force_world],
@@ -32,3 +35,10 @@ def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[st
         "first_value": state.safety.first_value,
         "late_ms": round(inp.host.late_ns * 1e-6, 3),
     }
+
+
+def _old(inp: TickInput, state: TickState) -> list[str]:
+    """Return which of force and pose are too old to stand for the present."""
+    force = state.control.tared and not state.control.force_valid
+    pose = inp.base.pose_seq > 0 and inp.now_ns - inp.base.pose_received_ns > FRESH_NS
+    return [name for name, old in (("force", force), ("pose", pose)) if old]

@@ -46,7 +46,8 @@ class TickCore(msgspec.Struct, frozen=True):
             )
         pose = trusted_pose(self.safety, state.safety, inp)
         seen = inp if pose is inp.base.pose else replace(inp, base=replace(inp.base, pose=pose))
-        control, wanted = step(self.control, state.control, seen, held=state.safety.mode == Mode.HOLD)
+        held = state.safety.mode == Mode.HOLD or inp.paused
+        control, wanted = step(self.control, state.control, seen, held=held)
         clamped = state.envelope.clamped
         safety, verdict = supervise(self.safety, state.safety, inp, control, wanted.body, clamped)
         new_envelope, command = envelope.apply(self.safety.envelope, state.envelope, wanted.body, verdict.mode)

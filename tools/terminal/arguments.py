@@ -27,6 +27,16 @@ def named_path(text: str) -> Path:
     return Path(name_or_path(text))
 
 
+MOST_LETTERS = 500
+
+
+def note(text: str) -> str:
+    """Return a remark of one line. Raises ArgumentTypeError for one that is too long or not printable."""
+    if len(text) > MOST_LETTERS or not text.isprintable():
+        raise ArgumentTypeError(f"a note is one line of at most {MOST_LETTERS} printable letters")
+    return text.strip()
+
+
 def number(low: float, high: float) -> Callable[[str], float]:
     """Return the type of a number from `low` to `high`, both included."""
 

@@ -19,7 +19,7 @@ def gain_warning(rig: RigConfig) -> str | None:
 
     Raises ConfigError if the simulated slider is not possible (it would tip over).
     """
-    control, bodies = rig.control, _bodies(rig)
+    control, bodies = rig.control, rig_bodies(rig)
     if control.controller != "force" or not bodies:
         return None
     highest = limit(bodies, control.k_f)
@@ -32,7 +32,7 @@ def gain_warning(rig: RigConfig) -> str | None:
     )
 
 
-def _bodies(rig: RigConfig) -> list[PushedBody]:
+def rig_bodies(rig: RigConfig) -> list[PushedBody]:
     """Return the sliders of `[sliders]`, and the simulated one if there is one."""
     world, pressure = rig.world, rig.sliders.pressure
     effects = FloorEffects(

@@ -2,51 +2,61 @@
 
 from __future__ import annotations
 
-import math
 import os
 import select
 import stat
 import sys
-import time
 from typing import Any
 
+from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.rig.config import RigConfig
+from tools.terminal.live_text import live_text
 from tools.verdict.first_cause import fault_words, limit_and_unit, stronger_than
 
 USUAL_COLUMNS = 80
 """Width assumed if the terminal does not report it."""
 
 
-class LiveLine:
-    """Prints to stderr; never waits and never raises if nobody reads it."""
+CLEAR = "\r\x1b[J"
+"""To the start of the line, and nothing behind it on the screen."""
+NEWS_NS = NS_PER_S
+"""Control reports five times a second: without news for longer, what is shown is marked as old."""
+NO_REWRITING = ("dumb", "")
 
-    def __init__(self, rig: RigConfig, *, quiet: bool = False) -> None:
+
+class LiveLine:
+    """Prints to stderr; never waits and never raises if nobody reads it.
+
+    On a terminal the cursor stays at the start of the line. A terminal that is made narrower wraps the line and takes
+    the cursor along with its first letter, so that all of it is behind the cursor and can be cleared.
+    """
+
+    def __init__(self, rig: RigConfig) -> None:
         self._rig = rig
-        self._quiet = quiet
-        self._terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._terminal = sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") not in NO_REWRITING
         self._fd = _without_waiting()
-        self._last_s = 0.0
-        self._width = 0
+        self._last_ns = 0
+        self._status: dict[str, Any] = {}
+        self._keys = self._shown = False
         self._faults: tuple[str, ...] = ()
 
-    def show(self, status: dict[str, Any]) -> None:
-        """Show one status event of control."""
+    def show(self, status: dict[str, Any], *, keys: bool = False) -> None:
+        """Show one status event of control; `keys`: whether the operator's keys are heard."""
         self._tell_faults(status)
-        if self._quiet:
+        now_ns = monotonic_ns()
+        if not self._terminal and now_ns - self._last_ns < NS_PER_S:
             return
-        now_s = time.monotonic()
-        if not self._terminal and now_s - self._last_s < 1.0:
-            return
-        self._last_s = now_s
-        line = self._line(status)
+        self._last_ns, self._status, self._keys = now_ns, status, keys
         if self._terminal:
-            # Cut to fit: a wrapped line cannot be rewritten and would fill the screen.
-            room = self._room()
-            line = line[:room]
-            self._write(f"\r{line:<{min(self._width, room)}}")
-            self._width = len(line)
+            self._rewrite(keys=keys)
         else:
-            self._write(line + "\n")
+            self._write(live_text(self._rig, status, keys=False, silent_s=0.0, room=None) + "\n")
+
+    def mark_old(self) -> None:
+        """Mark what is shown as old if it is; to be called now and then while control may be silent."""
+        silent_ns = monotonic_ns() - self._last_ns
+        if self._shown and silent_ns > NEWS_NS:
+            self._rewrite(keys=self._keys, silent_s=silent_ns / NS_PER_S)
 
     def _tell_faults(self, status: dict[str, Any]) -> None:
         """Tell each new fault; behind the first cause of a stop only what asks for more than it: the rest follows."""
@@ -61,16 +71,15 @@ class LiveLine:
 
     def say(self, text: str) -> None:
         """Print a separate line."""
-        if self._terminal and self._width:
-            self._write("\r" + " " * min(self._width, self._room()) + "\r")
-            self._width = 0
-        self._write(text + "\n")
+        self._write(f"{CLEAR if self._shown else ''}{text}\n")
+        self._shown = False
 
     def end(self) -> None:
         """Move on to a new line."""
-        if self._terminal and self._width:
+        if self._shown:
+            self._rewrite(keys=False)
             self._write("\n")
-            self._width = 0
+            self._shown = False
 
     def close(self) -> None:
         """Release its descriptor; later lines go to stderr as it is. Idempotent."""
@@ -78,16 +87,11 @@ class LiveLine:
             os.close(self._fd)
             self._fd = -1
 
-    def _line(self, status: dict[str, Any]) -> str:
-        # JSON has no NaN: a figure that is not known yet (no pose so far), or no number, is sent as null.
-        status = {key: math.nan if value is None else value for key, value in status.items()}
-        fx, fy, _ = (math.nan if value is None else value for value in status["force_N"])
-        control = self._rig.control
-        return (
-            f"{status['phase']:<9} {status['progress_m']:6.2f}/{control.distance_m:.2f} m  {status['mode']:<7}"
-            f"  off {status['lateral_m']:+.3f} m  |F| {math.hypot(fx, fy):5.1f}/{self._rig.limits.max_force_N:.0f} N"
-            f"  v {status['speed']:.2f} m/s  theta_p {math.degrees(status['theta_p']):+6.1f} deg"
-        )
+    def _rewrite(self, *, keys: bool, silent_s: float = 0.0) -> None:
+        """Write the newest status over the line. Cut to fit: a wrapped line would fill the screen."""
+        text = live_text(self._rig, self._status, keys=keys, silent_s=silent_s, room=self._room())
+        self._write(f"{CLEAR}{text}\r")
+        self._shown = True
 
     @staticmethod
     def _room() -> int:

@@ -26,6 +26,7 @@ def summary(
     log: Path,
     seed: int,
     level: str,
+    note: str,
     devices: dict[str, dict[str, int]],
     notes: list[str],
     witness: Witness,
@@ -33,8 +34,8 @@ def summary(
 ) -> dict[str, Any]:
     """Return the summary of a run (schema 1).
 
-    figures: what control reported at its end. witness: what else is known of the run. pushed: where the object is, as
-    far as that is known.
+    figures: what control reported at its end. note: the operator's. witness: what else is known of the run. pushed:
+    where the object is, as far as that is known.
     """
     trust = gather(rig, figures, witness, time.time())
     judged = judge(figures["exit_code"], trust)
@@ -53,6 +54,7 @@ def summary(
         "rig": rig.name,
         "level": level,
         "seed": seed,
+        "note": note,
         "out": str(out),
         "log": str(log),
         "phase": figures["phase"],
@@ -60,6 +62,9 @@ def summary(
         "faults": figures["faults"],
         "contact_seen": figures["contact_seen"],
         "residual_N": figures["residual_N"],
+        "worst_force_N": figures["worst_force_N"],
+        "pauses": figures["pauses"],
+        "paused_s": figures["paused_s"],
         "loop": figures["loop"],
         "safety_events": figures["events"],
         "fault_counts": figures["fault_counts"],
@@ -69,7 +74,7 @@ def summary(
 
 
 def person_lines(summary: dict[str, Any]) -> list[str]:
-    """Return the lines printed for people at the end of a run."""
+    """Return the lines printed for people at the end of a run: the verdict, and what is known of it."""
     verdict, where, distance_m = summary["verdict"], _where(summary), summary["distance_m"]
     if verdict in (DONE, OFF_THE_LINE, NOT_TRUSTED):
         against = "; ".join(_told(summary, "against"))
@@ -85,13 +90,14 @@ def person_lines(summary: dict[str, Any]) -> list[str]:
             f"(worst {loop['late_worst_ms']:.2f} ms), "
             f"{loop['skipped']} of {loop['ticks'] + loop['skipped']} ticks skipped"
         )
+    if summary["pauses"]:
+        times = "once" if summary["pauses"] == 1 else f"{summary['pauses']} times"
+        lines.append(f"paused {times}, {summary['paused_s']:.0f} s in all")
     lines.append(f"safety events: {_counts(summary['fault_counts'])}")
     if summary["residual_N"] is not None:
         lines.append(f"sensor after the push: {summary['residual_N']:.2f} N from zero")
     lines += summary["notes"]
     lines.append(f"log: {summary['log']}")
-    if summary.get("report"):
-        lines.append(f"report: {summary['report']}")
     return lines
 
 

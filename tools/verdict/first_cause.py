@@ -14,6 +14,11 @@ from safety.gate import LATCH_FAULT, Latch
 from safety.settings import SafetySettings
 
 GATE_LATCHED = "F67"
+EMULATORS = "emulators"
+OUTSIDE = {EMULATORS: "the emulators have ended, and with them every emulated device"}
+"""Causes that are no rows of the table: control sees only what follows from them."""
+FOLLOWS_WITHIN_S = 0.5
+"""The launcher may learn of a death this much later than control sees a device fall silent."""
 
 
 class FirstFault(msgspec.Struct, frozen=True):
@@ -50,6 +55,17 @@ def first_fault(rig: RigConfig, figures: dict[str, Any]) -> FirstFault | None:
     return FirstFault(fault, value, limit, unit, None if at_s is None else round(at_s, 3))
 
 
+def with_dead_emulators(figures: dict[str, Any], died_ns: int) -> dict[str, Any]:
+    """Return a run's figures with the death of its emulators as first cause, if what stopped the run came with it.
+
+    died_ns: when it was noticed (CLOCK_MONOTONIC), 0 if the emulators lived to the end of the run.
+    """
+    first_s, died_s = figures["first_fault_s"], (died_ns - figures["first_tick_ns"]) * 1e-9
+    if not died_ns or not figures["exit_code"] or first_s is None or first_s < died_s - FOLLOWS_WITHIN_S:
+        return figures
+    return figures | {"first_fault": EMULATORS, "first_value": None, "first_fault_s": min(first_s, died_s)}
+
+
 def limit_and_unit(rig: RigConfig, fault: str) -> tuple[float | None, str]:
     """Return the limit of a row with the settings of a rig (None: it has none), and the row's unit."""
     row = FAULTS.get(fault)
@@ -63,7 +79,7 @@ def fault_words(fault: str, value: float | None, limit: float | None, unit: str,
 
     at: said behind the number.
     """
-    text = f"{fault} {FAULTS[fault].text}" if fault in FAULTS else fault
+    text = f"{fault} {FAULTS[fault].text}" if fault in FAULTS else OUTSIDE.get(fault, fault)
     if value is None or not math.isfinite(value):
         return f"{text}{at}"
     measured, allowed = _beside(value, limit)

@@ -6,6 +6,7 @@ import pytest
 
 from sim_backend.physics.gain_limits import (
     PushedBody,
+    decay_per_m,
     fast_loop_k_f,
     frictionless_limit,
     limit,
@@ -57,6 +58,21 @@ def test_fast_loop_and_offsets():
     # by hand: 1.3 / 0.1 times an angle of 0.01745, or of 1 / 13.7
     assert offset_per_degree_m(0.3, 0.1) == pytest.approx(0.2269, abs=1e-4)
     assert offset_per_newton_m(0.3, 0.1, 13.7) == pytest.approx(0.95, abs=0.01)
+
+
+@pytest.mark.parametrize("body", [BOX, BARREL])
+@pytest.mark.parametrize("k_y", [0.2, 0.5])
+def test_a_disturbance_decays_in_the_simulated_world_as_fast_as_the_closed_form_says(body, k_y):
+    simulated_per_s = -growth_rate(body, 0.3, k_y, frictionless=False)
+    assert decay_per_m([body], 0.3, k_y) == pytest.approx(simulated_per_s / 0.1, rel=0.01)
+
+
+def test_decay_of_known_poles():
+    # The paper's barrel and gains without friction: -0.0095 +- 0.0105i per s at 0.1 m/s.
+    barrel = PushedBody(round=True, rho_m=0.5, d_m=1 / 3)
+    assert decay_per_m([barrel], 0.1, 0.01) == pytest.approx(0.095, abs=1e-4)
+    assert decay_per_m([barrel], 0.1, 0.2) == 0.0, "unstable"
+    assert decay_per_m([PushedBody(round=False, rho_m=0.5, d_m=0.5)], 1.1, 0.1) == 0.0, "the force angle runs away"
 
 
 @pytest.mark.parametrize("body", [BOX, BARREL])

@@ -22,6 +22,10 @@ from tools.places.running import Process, RunningRun, running_runs, start_time
 STOP, CONT = signal.SIGSTOP, signal.SIGCONT
 
 
+def running_folder(state):
+    return list((state / "single-point-push" / "running").iterdir())
+
+
 def emulated(folder, *more):
     return "run", "emulated", *QUICK, "--distance-m", "3", "--out", str(folder), "--json", *more
 
@@ -38,6 +42,14 @@ def test_a_run_under_way_is_stopped(state, tmp_path, host, asked):
     assert stop.last_object == {"schema": 1, "stopped": ["emulated"], "zeros_sent": False, "at_rest": True}
     assert ended.code == 130, ended.err
     assert stands(world_of(tmp_path / "run" / "run.mcap")[1][-1][1])
+
+
+def test_a_simulated_run_is_stopped_too(state, tmp_path):
+    with started(state, "run", "sim", *QUICK, "--distance-m", "3", "--out", str(tmp_path / "run")) as run:
+        run.wait_for("PUSH ")
+        assert finished(state, "stop", "--json").last_object["stopped"] == ["sim"]
+        assert run.wait(10.0).code == 130
+        assert running_folder(state) == []
 
 
 @pytest.mark.long

@@ -28,7 +28,8 @@ from sim_backend.sim.ridgeback import SimRidgeback
 from tests.push_runs import QUICK
 from tests.replay.runs import PUSH, ROOT, push
 from tools.rig import resolve_rig
-from tools.run.lockstep import Lockstep, WallPace, open_log
+from tools.run import paced
+from tools.run.lockstep import Lockstep, open_log
 from tools.run.tick_core import TickCore
 
 SHORT = ("run", "sim", "--fast", "--distance-m", "0.1", "--no-report")
@@ -177,28 +178,37 @@ def test_a_latch_of_the_gate_is_in_the_log_and_the_run_replays(tmp_path, monkeyp
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+class SlowlyWaiting:
+    """An event loop on a clock of its own: to wait takes as long as is waited."""
+
+    def __init__(self) -> None:
+        self.now_ns = 100 * NS_PER_S
+        self.waits_ns: list[int] = []
+
+    def call_at(self, deadline_ns: int, callback) -> None:
+        self.due = (deadline_ns, callback)
+
+    def run_once(self) -> None:
+        deadline_ns, callback = self.due
+        self.waits_ns.append(max(0, deadline_ns - self.now_ns))
+        self.now_ns = max(self.now_ns, deadline_ns)
+        callback(deadline_ns)
+
+
 def test_pacing_keeps_the_rate_and_never_bursts_after_a_pause(monkeypatch):
-    now_s = 100.0
-    waits = []
-
-    def sleep(seconds: float) -> None:
-        nonlocal now_s
-        waits.append(seconds)
-        now_s += seconds
-
-    monkeypatch.setattr(time, "monotonic", lambda: now_s)
-    monkeypatch.setattr(time, "sleep", sleep)
-    pace = WallPace(0.01)
+    loop = SlowlyWaiting()
+    monkeypatch.setattr(paced, "monotonic_ns", lambda: loop.now_ns)
+    pace = paced.WallPace(loop, 0.01)
     for _ in range(100):
-        now_s += 0.002  # the tick's own work
+        loop.now_ns += 2_000_000  # the tick's own work
         pace.wait()
-    assert now_s == pytest.approx(101.0)
-    now_s += 0.5
-    waits.clear()
+    assert loop.now_ns == 101 * NS_PER_S
+    loop.now_ns += NS_PER_S // 2
+    loop.waits_ns.clear()
     for _ in range(10):
         pace.wait()
-    assert waits[0] == 0.0
-    assert waits[1:] == pytest.approx([0.01] * 9)
+    assert loop.waits_ns[0] == 0
+    assert loop.waits_ns[1:] == [10_000_000] * 9
 
 
 def test_a_paced_run_takes_as_long_as_it_says(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from robot_io.rig.config import load_rig
 from safety.gate import Latch
 from tools.terminal.verdict import cause_words
-from tools.verdict.first_cause import FirstFault, fault_words, first_fault
+from tools.verdict.first_cause import FirstFault, fault_words, first_fault, with_dead_emulators
 
 RIG = load_rig("emulated")
 
@@ -68,3 +68,26 @@ def test_consequences_are_left_out_and_what_asked_for_more_is_said():
     said = "F24-hold no arm record for 40 ms: 52 ms at 2.0 s, limit 40 ms"
     assert cause_words(hold, ["F24-hold", "F01-hold", "F60-late"]) == said
     assert cause_words(hold, ["F64", "F24-hold"]) == f"{said}; then F64 the operator asked for a stop"
+
+
+def stopped_at(first_s, *, exit_code=5):
+    """Return figures of a run whose first tick was at 100 s on the machine's clock."""
+    return {
+        "first_tick_ns": 100 * 10**9, "first_fault": "F02", "first_value": 3.0, "first_fault_s": first_s,
+        "exit_code": exit_code, "latch_cause": 0,
+    }  # fmt: skip
+
+
+def test_emulators_that_died_first_are_the_cause_and_what_fell_silent_with_them_is_not():
+    for first_s in (7.3, 6.9, 8.1):  # the launcher may learn of it a little later than control sees what follows
+        first = first_fault(RIG, with_dead_emulators(stopped_at(first_s), 107 * 10**9))
+        assert first.id == "emulators"
+        assert first.words() == (
+            f"the emulators have ended, and with them every emulated device at {min(first_s, 7.0):.1f} s"
+        )
+
+
+def test_a_stop_before_the_emulators_died_keeps_its_own_cause():
+    assert first_fault(RIG, with_dead_emulators(stopped_at(3.0), 107 * 10**9)).id == "F02"
+    assert first_fault(RIG, with_dead_emulators(stopped_at(3.0), 0)).id == "F02"
+    assert with_dead_emulators(stopped_at(None, exit_code=0), 107 * 10**9)["first_fault_s"] is None

@@ -20,13 +20,14 @@ def code_and_machine() -> dict[str, str]:
     }
 
 
-def run_facts(rig: RigConfig, seed: int, *, in_contact: bool) -> dict[str, str]:
+def run_facts(rig: RigConfig, seed: int, *, in_contact: bool, note: str = "") -> dict[str, str]:
     """Return the facts of a run; none differs between two runs of the same code on the same machine."""
     return {
         **code_and_machine(),
         "level": level_of(rig),
         "seed": str(seed),
         "in_contact": str(in_contact),
+        **({"note": note} if note else {}),
         **({"faults_injected": "; ".join(rig.faults.inject)} if rig.faults.inject else {}),
         "bounds": json.dumps(bounds_of(rig)),
     }

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_io.tick import Mode
-from tools.report import plan_view
-from tools.report.bounded_series import Floats, Span
-from tools.report.run_data import RunData
-from tools.report.style import (
+from tools.report.bounded_series import Floats, Span, Tally
+from tools.report.drawing import plan_view
+from tools.report.drawing.style import (
     BLUE,
     GREEN,
     GREY,
@@ -24,10 +23,10 @@ from tools.report.style import (
     new_panels,
     no_data,
     plain,
-    png,
     shade_phases,
-    style,
 )
+from tools.report.drawing.thinned import thinned
+from tools.report.run_data import RunData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,18 +46,8 @@ MODE_COLOURS = {
 }
 
 
-def figures(run: RunData) -> dict[str, bytes]:
-    """Return every figure of a run as PNG, by name."""
-    drawn: dict[str, Callable[[RunData], Figure]] = {
-        "trajectory": plan_view.trajectory,
-        "force": force,
-        "speed": speed,
-        "tracking": tracking,
-        "timing": timing,
-        "safety": safety,
-    }
-    with style():
-        return {name: png(draw(run)) for name, draw in drawn.items()}
+FIGURES: dict[str, Callable[[RunData], Figure]]
+"""What draws each figure of a run, by name, in the order of the page. Call it and write its figure within `style`."""
 
 
 def force(run: RunData) -> Figure:
@@ -71,13 +60,16 @@ def force(run: RunData) -> Figure:
     size = np.hypot(ticks["force_x"], ticks["force_y"])
     for axes in (top, bottom):
         shade_phases(axes, ticks, named=axes is top)
-    top.plot(ticks["t_s"], size, color=BLUE, label="horizontal magnitude, filtered")
-    top.plot(ticks["t_s"], ticks["force_y"], color=PURPLE, linewidth=1.0, label="component to the left of the path")
+    top.plot(*thinned(ticks["t_s"], size), color=BLUE, label="horizontal")
+    top.plot(*thinned(ticks["t_s"], ticks["force_y"]), color=PURPLE, linewidth=1.0, label="to the left")
     top.axhline(control.force_min_N, color=INK, linestyle=":", label=f"contact above {control.force_min_N:g} N")
-    top.set_ylabel("force on the object (N)")
+    top.set_ylabel("force (N)")
     _legend(top, 3)
     bottom.semilogy(
-        ticks["t_s"], np.maximum(ticks["force_raw"], FLOOR_N), color=GREY, linewidth=0.9, label="raw magnitude"
+        *thinned(ticks["t_s"], np.maximum(ticks["force_raw"], FLOOR_N)),
+        color=GREY,
+        linewidth=0.9,
+        label="raw",
     )
     for value, colour, dashes, name in (
         (limits.max_force_N, VERMILLION, "-", "stop"),
@@ -88,7 +80,7 @@ def force(run: RunData) -> Figure:
     peak = _greatest(ticks["force_raw"])
     bottom.set_ylim(FLOOR_N, 1.6 * max(limits.max_force_N, peak))
     bottom.set_yticks([1, 10, 100], labels=["1", "10", "100"])
-    bottom.set_ylabel("raw reading (N)")
+    bottom.set_ylabel("raw (N)")
     bottom.set_xlabel("time (s)")
     _legend(bottom, 4)
     return figure
@@ -102,15 +94,19 @@ def speed(run: RunData) -> Figure:
     if not len(ticks["t_s"]):
         return _empty(figure, (axes,))
     shade_phases(axes, ticks, named=True)
-    axes.plot(ticks["t_s"], ticks["speed_measured"], color=ORANGE, linewidth=2.6, label="measured (odometry)")
+    axes.plot(*thinned(ticks["t_s"], ticks["speed_measured"]), color=ORANGE, linewidth=2.6, label="measured")
     axes.plot(
-        ticks["t_s"], ticks["speed_wanted"], color=INK, linewidth=1.0, linestyle="--", label="requested by the law"
+        *thinned(ticks["t_s"], ticks["speed_wanted"]),
+        color=INK,
+        linewidth=1.0,
+        linestyle="--",
+        label="requested",
     )
-    axes.plot(ticks["t_s"], ticks["speed_command"], color=BLUE, linewidth=1.1, label="commanded, after safety")
+    axes.plot(*thinned(ticks["t_s"], ticks["speed_command"]), color=BLUE, linewidth=1.1, label="commanded")
     greatest = max(_greatest(ticks[name]) for name in ("speed_measured", "speed_wanted", "speed_command"))
     axes.set_ylim(-0.04 * max(greatest, 0.01), 1.3 * max(greatest, 0.01))
     axes.set_xlabel("time (s)")
-    axes.set_ylabel("speed of the base (m/s)")
+    axes.set_ylabel("speed (m/s)")
     _legend(axes, 3)
     return figure
 
@@ -126,17 +122,17 @@ def tracking(run: RunData) -> Figure:
         shade_phases(axes, ticks, named=axes is panels[0])
         axes.axhline(0.0, color=INK, linewidth=0.7)
     offset, angles, heading = panels
-    offset.plot(ticks["t_s"], ticks["lateral_m"], color=BLUE)
+    offset.plot(*thinned(ticks["t_s"], ticks["lateral_m"]), color=BLUE)
     _at_least(offset, 0.05)
-    offset.set_ylabel("contact point,\nleft of path (m)")
-    angles.plot(ticks["t_s"], np.degrees(ticks["theta_f"]), color=VERMILLION, linewidth=1.0, label="force")
-    angles.plot(ticks["t_s"], np.degrees(ticks["theta_p"]), color=BLUE, label="push")
+    offset.set_ylabel("left of\npath (m)")
+    angles.plot(*thinned(ticks["t_s"], np.degrees(ticks["theta_f"])), color=VERMILLION, linewidth=1.0, label="force")
+    angles.plot(*thinned(ticks["t_s"], np.degrees(ticks["theta_p"])), color=BLUE, label="push")
     _at_least(angles, 5.0)
-    angles.set_ylabel("angle from\nthe path (deg)")
+    angles.set_ylabel("angles\n(deg)")
     _legend(angles, 2)
-    heading.plot(ticks["t_s"], np.degrees(ticks["heading_error"]), color=GREEN)
+    heading.plot(*thinned(ticks["t_s"], np.degrees(ticks["heading_error"])), color=GREEN)
     _at_least(heading, 1.0)
-    heading.set_ylabel("base heading\nerror (deg)")
+    heading.set_ylabel("heading\n(deg)")
     heading.set_xlabel(f"time (s); a heading error of {run.rig.limits.max_heading_error_deg:g} deg is a stop")
     figure.align_ylabels(panels)
     return figure
@@ -144,46 +140,55 @@ def tracking(run: RunData) -> Figure:
 
 def timing(run: RunData) -> Figure:
     """Draw how late the ticks started, and when ticks were skipped."""
-    figure = new_panels(4.0, gap_in=0.55)
+    virtual = run.late.total > 0 and run.late.worst_ms == 0.0
+    figure = new_panels(1.6 if virtual else 4.0, gap_in=0.55)
+    if virtual:
+        _skips(figure.subplots(), run, "no tick was late: this run used a virtual clock")
+        return figure
     top, bottom = figure.subplots(2, 1, height_ratios=(3, 1))
-    late = run.late
-    if not late.total:
+    if not run.late.total:
         return _empty(figure, (top, bottom))
-    if late.worst_ms == 0.0:
-        no_data(top, "no tick was late: this run used a virtual clock")
-    else:
-        wanted = np.geomspace(late.BIN_MS, max(late.worst_ms * 1.05, 1.0), 60)
-        edges = np.unique(np.ceil(wanted / late.BIN_MS)) * late.BIN_MS
-        edges = np.concatenate(([0.0], edges))
-        top.stairs(late.counts_in(edges), edges, fill=True, color=SKY)
-        top.set_xscale("log")
-        top.set_yscale("log")
-        top.set_ylim(bottom=0.7)
-        for value, colour, dashes, name in (
-            (late.percentile_ms(50), INK, ":", "median"),
-            (late.percentile_ms(99), BLUE, "--", "99 %"),
-            (late.worst_ms, VERMILLION, "-", "worst"),
-        ):
-            top.axvline(value, color=colour, linestyle=dashes, label=f"{name}: {value:.2f} ms")
-        top.set_xlim(late.BIN_MS / 2, edges[-1])
-        for axis in (top.xaxis, top.yaxis):
-            axis.set_major_formatter(lambda value, _: f"{value:g}")
-        top.set_xlabel("lateness of a tick (ms)")
-        top.set_ylabel("ticks")
-        _legend(top, 3)
-    shade_phases(bottom, run.ticks, named=True)
-    bottom.grid(visible=False)
+    _lateness(top, run.late)
+    _skips(bottom, run, "none")
+    return figure
+
+
+def _lateness(axes: Axes, late: Tally) -> None:
+    wanted = np.geomspace(late.BIN_MS, max(late.worst_ms * 1.05, 1.0), 60)
+    edges = np.unique(np.ceil(wanted / late.BIN_MS)) * late.BIN_MS
+    edges = np.concatenate(([0.0], edges))
+    axes.stairs(late.counts_in(edges), edges, fill=True, color=SKY)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=0.7)
+    for value, colour, dashes, name in (
+        (late.percentile_ms(50), INK, ":", "median"),
+        (late.percentile_ms(99), BLUE, "--", "99 %"),
+        (late.worst_ms, VERMILLION, "-", "worst"),
+    ):
+        axes.axvline(value, color=colour, linestyle=dashes, label=f"{name}: {value:.2f} ms")
+    axes.set_xlim(late.BIN_MS / 2, edges[-1])
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_xlabel("lateness of a tick (ms)")
+    axes.set_ylabel("ticks")
+    _legend(axes, 3)
+
+
+def _skips(axes: Axes, run: RunData, none: str) -> None:
+    """Draw when how many ticks were skipped, or write `none`."""
+    shade_phases(axes, run.ticks, named=True)
+    axes.grid(visible=False)
     if run.skips:
         times, counts = zip(*run.skips, strict=True)
-        bottom.vlines(times, 0, counts, color=VERMILLION, linewidth=1.6)
-        bottom.set_ylim(0, 1.2 * max(counts))
+        axes.vlines(times, 0, counts, color=VERMILLION, linewidth=1.6)
+        axes.set_ylim(0, 1.2 * max(counts))
     else:
-        bottom.set_ylim(0, 1)
-        bottom.set_yticks([])
-        bottom.text(0.5, 0.5, "none", transform=bottom.transAxes, ha="center", va="center", color=GREY)
-    bottom.set_ylabel("skipped")
-    bottom.set_xlabel("time (s)")
-    return figure
+        axes.set_ylim(0, 1)
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, none, transform=axes.transAxes, ha="center", va="center", color=GREY)
+    axes.set_ylabel("skipped")
+    axes.set_xlabel("time (s)")
 
 
 def safety(run: RunData) -> Figure:
@@ -207,7 +212,7 @@ def safety(run: RunData) -> Figure:
         axes.broken_barh(bars, (row - 0.32, 0.64), color=VERMILLION)
     left_out = f" (and {len(names) - len(shown)} more)" if len(names) > len(shown) else ""
     labels = ["mode", *(plain(name, 14) for name in shown)]
-    axes.set_yticks(range(len(labels)), labels=labels)
+    axes.set_yticks(range(len(labels)), labels=labels, fontsize=11)
     axes.set_ylim(len(labels) - 0.5, -0.6)
     axes.grid(visible=False)
     axes.set_xlabel(f"time (s){left_out}" if shown else "time (s); no fault")
@@ -256,3 +261,13 @@ def _at_least(axes: Axes, span: float) -> None:
 def _greatest(values: Floats) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.max()) if len(finite) else 0.0
+
+
+FIGURES = {
+    "trajectory": plan_view.trajectory,
+    "tracking": tracking,
+    "force": force,
+    "speed": speed,
+    "safety": safety,
+    "timing": timing,
+}

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 # Okabe and Ito, "Color Universal Design" (2008).
 BLUE, ORANGE, GREEN, VERMILLION, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#AA4499"
 GREY, INK = "#8a8a8a", "#222222"
+CORRIDOR = "#f1f5f1"
 
-WIDTH_IN = 8.0
+WIDTH_IN = 6.4
 DPI = 110
 
 PHASE_COLOURS = {
@@ -36,6 +37,37 @@ PHASE_COLOURS = {
     Phase.DONE: "#ffffff",
     Phase.FAILED: "#f6cfd6",
 }
+DARK = {
+    INK: "#e4e7ea",
+    "#000000": "#e4e7ea",
+    "#ffffff": "#171717",
+    "#666666": "#9aa4ad",
+    GREY: "#a8a8a8",
+    "#888888": "#a0a0a0",
+    "#c4c4c4": "#4a4a4a",
+    "#cccccc": "#555555",
+    BLUE: "#5eb3f0",
+    ORANGE: "#f0b93a",
+    GREEN: "#3fcf9f",
+    VERMILLION: "#ff8a4c",
+    SKY: "#7cc6f2",
+    PURPLE: "#d488cc",
+    CORRIDOR: "#1b201c",
+    "#eeeeee": "#262626",
+    "#e3e3e3": "#2e2e2e",
+    "#fbf1cc": "#3a3418",
+    "#dcecf7": "#1b2c3a",
+    "#f9d9c4": "#472c1a",
+    "#f3c3a6": "#5a3118",
+    "#e6f2dd": "#23331a",
+    "#d7ead9": "#1d3a24",
+    "#ececec": "#2a2a2a",
+    "#f6cfd6": "#4a1f28",
+}
+"""What a colour becomes on a dark page."""
+
+TIME, PLAN = "time", "plan"
+"""What the axes of a figure show, as their gid: a page finds by it where to draw its cursor."""
 _LABEL_SHARE = 0.05
 """A phase shorter than this share of the axis has no room for its name."""
 
@@ -43,7 +75,7 @@ _STYLE: Any = {
     "font.size": 10,
     "axes.titlesize": 10.5,
     "axes.labelsize": 10,
-    "legend.fontsize": 9,
+    "legend.fontsize": 9.5,
     "xtick.labelsize": 9.5,
     "ytick.labelsize": 9.5,
     "axes.spines.top": False,
@@ -62,6 +94,9 @@ _STYLE: Any = {
     "text.parse_math": False,
     "axes.unicode_minus": False,
     "agg.path.chunksize": 20_000,
+    # Text stays text in SVG, and the same figure gives the same bytes.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "push",
 }
 
 
@@ -98,14 +133,19 @@ def new_panels(height_in: float, *, left_in: float = 0.75, gap_in: float = 0.1) 
 
 def png(figure: Figure, dpi: float = DPI) -> bytes:
     """Return a figure as PNG; the same figure gives the same bytes."""
+    lay_out(figure)
+    target = io.BytesIO()
+    figure.savefig(target, dpi=dpi, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    return target.getvalue()
+
+
+def lay_out(figure: Figure) -> None:
+    """Fix the layout of a figure, so that its axes stay where they are."""
     engine = figure.get_layout_engine()
     if engine is not None:
         # Lay out once, here: savefig with an engine draws everything twice, a third of a report's time.
         engine.execute(figure)
         figure.set_layout_engine("none")
-    target = io.BytesIO()
-    figure.savefig(target, dpi=dpi, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": 3})
-    return target.getvalue()
 
 
 def warm_up() -> None:
@@ -113,7 +153,7 @@ def warm_up() -> None:
     with style():
         figure = new_figure(1.0)
         figure.subplots()
-        png(figure)
+        figure.savefig(io.StringIO(), format="svg")
 
 
 def plain(text: str, most: int = 40) -> str:
@@ -145,6 +185,7 @@ def shade_phases(axes: Axes, ticks: dict[str, Floats], *, named: bool) -> None:
     begin, end = spans[0][1], spans[-1][2]
     length = max(end - begin, 0.1)
     axes.set_xlim(begin, begin + length)
+    axes.set_gid(TIME)
     for phase, since, until in spans:
         axes.axvspan(since, until, color=PHASE_COLOURS[phase], linewidth=0, zorder=0)
         if named and until - since >= _LABEL_SHARE * length:

@@ -4,24 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from robot_io.errors import ContactLost
 from robot_io.tick import Phase
 from tools.report.bounded_series import Floats
+from tools.report.drawing.style import (
+    BLUE,
+    CORRIDOR,
+    GREEN,
+    GREY,
+    INK,
+    PLAN,
+    PURPLE,
+    VERMILLION,
+    WIDTH_IN,
+    new_figure,
+    no_data,
+)
+from tools.report.drawing.thinned import thinned_path
 from tools.report.run_data import RunData
-from tools.report.style import BLUE, GREEN, GREY, INK, PURPLE, VERMILLION, WIDTH_IN, new_figure, no_data
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+PUSHED = (Phase.PUSH, Phase.LOST, Phase.LOST_HOLD, Phase.REST)
+"""Phases from first contact to rest."""
 OUTLINE_EVERY_M = 0.5
 MOST_OUTLINES = 40
-LEFT_IN, RIGHT_IN, BOTTOM_IN, LEGEND_IN, GAP_IN = 0.75, 0.15, 0.55, 0.45, 0.32
+LEFT_IN, RIGHT_IN, BOTTOM_IN, LEGEND_IN = 0.75, 0.15, 0.55, 0.7
 LOWEST_IN, HIGHEST_IN = 1.2, 7.0
 """Limits for a panel's height; both axes always have the same scale."""
 FORCE_ARROW_M = 0.25
@@ -53,10 +67,14 @@ class RunInPlan:
 
     def marks(self) -> list[int]:
         """Return ticks of the push, first and last included, about every half metre the contact point travelled."""
-        pushed = np.flatnonzero(np.isin(self.phase, (Phase.PUSH, Phase.LOST, Phase.LOST_HOLD, Phase.REST)))
+        pushed = np.flatnonzero(np.isin(self.phase, PUSHED))
         pushed = pushed[np.isfinite(self.x[pushed]) & np.isfinite(self.y[pushed])]
         if not len(pushed):
             return []
+        # Twice a second: from tick to tick the noise of the pose would add up to more than the way.
+        times = self.run.ticks["t_s"][pushed]
+        seldom = np.searchsorted(times, np.arange(times[0], times[-1], 0.5))
+        pushed = pushed[np.unique([*seldom.tolist(), len(pushed) - 1])]
         way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(self.x[pushed]), np.diff(self.y[pushed])))))
         every = max(OUTLINE_EVERY_M, float(way[-1]) / MOST_OUTLINES)
         # The last mark shows the end; one just before it would only be covered.
@@ -66,52 +84,42 @@ class RunInPlan:
 
 def trajectory(run: RunData) -> Figure:
     """Draw one run from above."""
-    return _figure([RunInPlan(run)], titled=False)
+    place = RunInPlan(run)
+    figure, axes = plan_axes([place], LEGEND_IN)
+    if not np.isfinite(place.x).any():
+        no_data(axes, "no pose of the base in this log")
+        return figure
+    axes.set_gid(PLAN)
+    _draw(axes, place)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper center", ncols=3, frameon=False, handlelength=1.6, columnspacing=2.4)
+    return figure
 
 
-def compare(runs: Sequence[RunData]) -> Figure:
-    """Draw several runs from above, one below another at the same scale."""
-    return _figure([RunInPlan(run) for run in runs], titled=True)
-
-
-def _figure(places: Sequence[RunInPlan], *, titled: bool) -> Figure:
+def plan_axes(places: Sequence[RunInPlan], legend_in: float) -> tuple[Figure, Axes]:
+    """Return a figure with room for a legend above its only axes, which hold all of these runs at one scale."""
     x_range, y_range = _limits(places)
     scale = (WIDTH_IN - LEFT_IN - RIGHT_IN) / (x_range[1] - x_range[0])
     panel_in = scale * (y_range[1] - y_range[0])
-    step_in = panel_in + GAP_IN
-    height_in = BOTTOM_IN + step_in * len(places) + LEGEND_IN
+    height_in = BOTTOM_IN + panel_in + legend_in
     figure = new_figure(height_in, constrained=False)
-    panels = []
-    for number, place in enumerate(places):
-        bottom_in = BOTTOM_IN + step_in * (len(places) - 1 - number)
-        width = 1.0 - (LEFT_IN + RIGHT_IN) / WIDTH_IN
-        axes = figure.add_axes((LEFT_IN / WIDTH_IN, bottom_in / height_in, width, panel_in / height_in))
-        panels.append(axes)
-        axes.set_xlim(*x_range)
-        axes.set_ylim(*y_range)
-        if not np.isfinite(place.x).any():
-            no_data(axes, "no pose of the base in this log")
-            continue
-        _draw(axes, place)
-        axes.set_ylabel("left of path (m)")
-        axes.tick_params(labelbottom=place is places[-1])
-        if titled:
-            axes.set_title(_title(place.run), loc="left", fontweight="bold")
+    width = 1.0 - (LEFT_IN + RIGHT_IN) / WIDTH_IN
+    axes = figure.add_axes((LEFT_IN / WIDTH_IN, BOTTOM_IN / height_in, width, panel_in / height_in))
+    axes.set_xlim(*x_range)
+    axes.set_ylim(*y_range)
     all_seen = all(place.contact_seen for place in places)
-    panels[-1].set_xlabel(
-        "along the path, from first contact (m)" if all_seen else "along the path, from its origin (m)"
-    )
-    handles, labels = _legend(panels)
-    if handles:
-        figure.legend(handles, labels, loc="upper center", ncols=4, frameon=False, handlelength=1.6)
-    return figure
+    axes.set_xlabel("along the path, from first contact (m)" if all_seen else "along the path, from its origin (m)")
+    axes.set_ylabel("left of path (m)")
+    return figure, axes
 
 
 def _draw(axes: Axes, place: RunInPlan) -> None:
     x, y, marks = place.x, place.y, place.marks()
     way = [-place.zero_m, place.run.rig.control.distance_m]
     axes.plot(way, [0.0, 0.0], color=INK, linestyle=(0, (5, 4)), linewidth=1.0, label="path")
-    axes.plot(x, y, color=BLUE, label="contact point", zorder=3, linewidth=1.7)
+    corridor_m = place.run.rig.goal.corridor_m
+    axes.axhspan(-corridor_m, corridor_m, color=CORRIDOR, linewidth=0, zorder=0, label=f"corridor of {corridor_m:g} m")
+    axes.plot(*thinned_path(x, y), color=BLUE, label="contact point", zorder=3, linewidth=1.7)
     _object(axes, place)
     _balls(axes, place)
     _forces(axes, place)
@@ -142,15 +150,6 @@ def outline(run: RunData) -> list[tuple[float, float]] | None:
     return [(-h, w), (-h, -w), (h, -w), (h, w), (-h, w)]
 
 
-def _title(run: RunData) -> str:
-    law = "force feedback" if run.rig.control.controller == "force" else "open loop, straight ahead"
-    if run.last is None:
-        return law
-    control = run.last.after.control
-    how = "object lost after" if ended(run) == ContactLost.exit_code else "pushed"
-    return f"{law}: {how} {control.end_progress_m or control.progress_m:.2f} m"
-
-
 def _limits(places: Sequence[RunInPlan]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the ranges along and across the path (m) that contain everything and keep the panel's height in limits."""
     xs = np.concatenate([values for place in places for values in (place.x, place.slider()[1])])
@@ -179,7 +178,8 @@ def _object(axes: Axes, place: RunInPlan) -> None:
     first, last = 0, len(times)
     if len(place.run.ticks["t_s"]):  # motion before and after the run is not drawn
         first, last = np.searchsorted(times, (0.0, place.run.ticks["t_s"][-1])).tolist()
-    axes.plot(x[first:last], y[first:last], color=GREY, linewidth=1.2, linestyle=":", label="object's centre", zorder=2)
+    centre = thinned_path(x[first:last], y[first:last])
+    axes.plot(*centre, color=GREY, linewidth=1.2, linestyle=":", label="object's centre", zorder=2)
     shape = outline(place.run)
     label = "object"
     for tick in place.marks():
@@ -236,23 +236,3 @@ def _forces(axes: Axes, place: RunInPlan) -> None:
     )
     # A quiver has no legend entry of its own.
     axes.plot([], [], color=VERMILLION, linewidth=2, label="force on the object")
-
-
-def _legend(panels: Sequence[Axes]) -> tuple[list[Any], list[str]]:
-    found: dict[str, Any] = {}
-    for axes in panels:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    return list(found.values()), list(found)
-
-
-def write_compare(logs: Sequence[Path], out: Path) -> None:
-    """Draw the plan view of several logs into a new PNG. Raises as `read_run`; OSError when it cannot be written."""
-    from tools.report.run_data import read_run
-    from tools.report.style import png, style
-
-    runs = [read_run(log) for log in logs]
-    with style():
-        data = png(compare(runs), dpi=150)
-    with out.open("xb") as file:
-        file.write(data)

@@ -1,0 +1,1 @@
+"""Pushes as a film, from above: frames drawn with matplotlib, written as GIF or MP4."""
