@@ -125,6 +125,24 @@ ACTIONS = {
     "log cat": ("push log cat runs/demo --topics /safety/event", "push log cat runs/demo | head -3"),
     "log export": ("push log export runs/demo", "push log export runs/demo --topics /ft/wrench --out tables"),
     "log recover": ("push log recover runs/demo", "push log recover runs/demo --out whole.mcap"),
+    "calibrate bias": ("push calibrate bias my-rig.toml", "push calibrate bias emulated --rehearse --seconds 20"),
+    "calibrate sign": ("push calibrate sign my-rig.toml", "push calibrate sign emulated --rehearse"),
+    "calibrate frame": (
+        "push calibrate frame my-rig.toml --cord 0,120,240 --apply my-rig.toml",
+        "push calibrate frame my-rig.toml --from runs/one runs/two runs/three",
+    ),
+    "calibrate contact": (
+        "push calibrate contact my-rig.toml --apply my-rig.toml",
+        "push calibrate contact emulated --rehearse --json",
+    ),
+    "calibrate marker": (
+        "push calibrate marker my-rig.toml --apply my-rig.toml",
+        "push calibrate marker emulated --rehearse",
+    ),
+    "calibrate path": (
+        "push calibrate path my-rig.toml --two-places",
+        "push calibrate path emulated --rehearse --json",
+    ),
     "emulate ft300": ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate ft300 --streaming --latency-ms 16"),
     "emulate ur10": ("push emulate ur10", "push emulate ur10 --host 127.0.0.11 --json"),
     "emulate ridgeback": ("push emulate ridgeback", "push emulate ridgeback --port 0 --json"),
