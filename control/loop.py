@@ -123,6 +123,7 @@ class ControlLoop:
         self._paused = False
         self._launcher, self._recorder = Silence(), Silence()
         self._consumed = 0
+        self._last_tick_ns = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
@@ -214,7 +215,8 @@ class ControlLoop:
         except Exception as error:  # top level of the loop: whatever failed, the base gets zero and the log records it
             self._give_up(inp, error)
         self.last_ns = now_ns
-        self.timing.note(paced.late_ns, paced.skipped, self._clock() - now_ns)
+        self._last_tick_ns = self._clock() - now_ns
+        self.timing.note(paced.late_ns, paced.skipped, self._last_tick_ns)
 
     def _one_tick(self, inp: TickInput) -> None:
         after, output = self._fold(self._state, inp)
@@ -275,6 +277,7 @@ class ControlLoop:
                 self._launcher.so_far_ns(now_ns),
                 self._recorder.so_far_ns(now_ns),
                 self._asleep_ns,
+                self._last_tick_ns,
             ),
             ft_input(readings, self._health, self._taken),
             self._arm_record,

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from enum import IntEnum
 
 import msgspec
 
 from robot_io.messages import Vector3, Vector6
+from robot_io.named_values import Refusal as Refusal
 from robot_io.tick import Counts6, TareSums
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -39,17 +39,6 @@ VERTICAL_SHARE = 0.5
 Flags6 = tuple[bool, bool, bool, bool, bool, bool]
 
 _ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-class Refusal(IntEnum):
-    """Why a tare is refused."""
-
-    NONE = 0
-    UNSETTLED = 1
-    SATURATED = 2
-    DEAD = 3
-    IMPLAUSIBLE = 4
-    """Only where the run starts in contact: the force there is none that an object on the path can give."""
 
 
 class Tare(msgspec.Struct, frozen=True, gc=False):

@@ -21,6 +21,10 @@ BRACKET_TRIES = 5
 
 SIM_EPOCH_NS = 1_600_000_000 * NS_PER_S
 """Log time of tick 0 at level `sim` (a fixed instant, so that two runs give identical files)."""
+SIM_START_NS = NS_PER_S
+"""Virtual time of tick 0 at level `sim`."""
+SIM_WALL_OFFSET_NS = SIM_EPOCH_NS - SIM_START_NS
+"""Wall clock minus virtual clock at level `sim`."""
 
 
 def monotonic_ns() -> int:

@@ -9,14 +9,20 @@ All are frozen, built of floats, ints and tuples, in SI units.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import ClassVar, Generic, TypeVar
+from typing import Annotated, ClassVar, Generic, TypeVar
 
 import msgspec
+
+from robot_io.named_values import ArmError as ArmError
+from robot_io.named_values import Latch
+from robot_io.odometry_pose import OdometryPose
 
 T = TypeVar("T")
 Vector3 = tuple[float, float, float]
 _NAN = float("nan")
 Vector6 = tuple[float, float, float, float, float, float]
+_STAMPS_S = (946_684_800, 2**31)
+"""From 2000 to what ROS can express, s since 1970: an earlier stamp is of a clock that was never set."""
 
 
 class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
@@ -29,6 +35,14 @@ class Stamped(msgspec.Struct, Generic[T], frozen=True, gc=False):
     """When it arrived, CLOCK_MONOTONIC."""
     device_time_s: float = float("nan")
     """The device's own time (s), NaN where it gives none."""
+    stamp_ns: int = 0
+    """The time that its sender wrote into the message, ns since 1970 by the sender's clock; 0 where it has none."""
+
+    @property
+    def epoch_ns(self) -> int:
+        """Return `stamp_ns` where it is a time between 2000 and 2038, else 0."""
+        first_s, last_s = _STAMPS_S
+        return self.stamp_ns if first_s * 10**9 <= self.stamp_ns < last_s * 10**9 else 0
 
 
 class SensorWrench(msgspec.Struct, frozen=True, gc=False):
@@ -94,7 +108,7 @@ class JointState(msgspec.Struct, frozen=True, gc=False):
     """Base, shoulder, elbow, wrist 1, 2, 3 (rad)."""
     velocity: Joints
     """The same joints (rad/s)."""
-    state: int
+    state: Annotated[int, "uint8", ArmState]
     """An `ArmState`."""
     device_state: int
     """The controller's own modes, packed by its driver: for the log and its maker's manual, judged by nobody."""
@@ -122,6 +136,13 @@ class LinkState(IntEnum):
     """The link is gone (error, EOF, reset). A driver never resumes by itself."""
 
 
+class ClockOffset(msgspec.Struct, frozen=True, gc=False):
+    """How far a device's wall clock is ahead of this machine's, and how well that is known: s."""
+
+    ahead_s: float
+    within_s: float
+
+
 class DeviceInfo(msgspec.Struct, frozen=True, gc=False):
     """Identity that a device gave when it was opened."""
 
@@ -134,6 +155,8 @@ class DeviceInfo(msgspec.Struct, frozen=True, gc=False):
     serial: str = ""
     remarks: tuple[str, ...] = ()
     """What was noticed while it was opened and the operator should know, in words."""
+    clock: ClockOffset | None = None
+    """Of the clock that stamps its messages; None where it has none or does not tell."""
 
 
 class DeviceHealth(msgspec.Struct, frozen=True, gc=False):
@@ -164,6 +187,8 @@ class BaseOdometry(msgspec.Struct, frozen=True, gc=False, tag=True):
     """Measured velocity in the BODY frame; NaN where the message held null."""
 
     twist: BodyTwist
+    pose: OdometryPose | None = None
+    """What else the message said, for the log; None where there is none, or a number of it was null."""
 
 
 class BaseReport(msgspec.Struct, frozen=True, gc=False, tag=True):
@@ -194,24 +219,6 @@ BaseFeed = BasePose | BaseOdometry | BaseReport | SliderPose | CommandEcho
 ZERO_JOINTS: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class ArmError(IntEnum):
-    """What the arm's process found wrong, for the log and the operator; safety judges the data itself."""
-
-    NONE = 0
-    LINK_LOST = 1
-    """The RTDE connection is gone."""
-    TIME_WENT_BACK = 2
-    """The controller's clock jumped back: it was restarted."""
-    NOT_FINITE = 3
-    """The newest packet holds NaN or infinity; passed on as it is, and over with the next good packet."""
-    SERVO_STOPPED = 4
-    """Active holding ended by itself: the control script no longer runs, or refused the target."""
-    SERVO_NOT_HOLDING = 5
-    """Active holding was given up: the joints were too far from the held target."""
-    SERVO_STALE = 6
-    """Active holding was given up: no new packet for too long."""
-
-
 class ArmRecord(msgspec.Struct, frozen=True, gc=False):
     """Newest state of the arm: joints (rad, rad/s), times in CLOCK_MONOTONIC ns, 0 where there is none yet."""
 
@@ -223,9 +230,9 @@ class ArmRecord(msgspec.Struct, frozen=True, gc=False):
     """When this record was written."""
     changed_ns: int = 0
     """When the controller's time stamp was last seen to change."""
-    link: int = 0
+    link: Annotated[int, "uint8", LinkState] = 0
     """A `LinkState`."""
-    error: int = 0
+    error: Annotated[int, "uint8", ArmError] = 0
     """An `ArmError`."""
     servo: bool = False
     """The arm is held actively (`hold = "servo"`) and so far without a fault."""
@@ -259,7 +266,7 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     """When the bridge last answered a ping: proves its I/O thread only."""
     accepted_seq: int = 0
     """Sequence number of the last frame of control that the gate accepted."""
-    verdict: int = 0
+    verdict: Annotated[int, "uint8", Latch] = 0
     """Why the gate did not accept the newest frame that it read (a `Latch` number; 0: it did).
 
     After a latch this is its cause, whatever the frame. A latch without a frame shows in `latch_cause` alone."""
@@ -268,7 +275,7 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     sent_ns: int = 0
     latched: bool = False
     """The gate sends nothing but zero until it is restarted."""
-    latch_cause: int = 0
+    latch_cause: Annotated[int, "uint8", Latch] = 0
     """The `Latch` that came first, 0: none."""
     published_ns: int = 0
     """When this record was written."""
@@ -281,6 +288,9 @@ class BaseRecord(msgspec.Struct, frozen=True, gc=False):
     object_received_ns: int = 0
     lag_ns: int = 0
     """How much older odometry has become on its way than it was in the run's first second, by its own stamps."""
+    pose_stamp_ns: int = 0
+    odometry_stamp_ns: int = 0
+    """When the sender says that pose and odometry are of, ns since 1970 by its own clock; 0: it does not say."""
 
 
 NO_BASE = BaseRecord()

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from enum import IntEnum
 
 import msgspec
 
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.messages import BodyTwist
+from robot_io.named_values import Latch as Latch
 from safety.envelope import EnvelopeLimits, contact_speed, is_number, reduces, too_fast
 from safety.motion_bounds import TravelLimits
 from safety.travel import Travel
@@ -33,30 +33,6 @@ REPEAT_NS = 18_000_000
 CONTACT_MARGIN = 1.001
 """The contact ball may exceed the envelope by this much (rounding in the envelope's scaling)."""
 OVERSPEED_SAMPLES = 3
-
-
-class Latch(IntEnum):
-    """Why the gate has latched."""
-
-    NONE = 0
-    SILENCE = 1
-    EOF = 2
-    NONSENSE = 3
-    SEQUENCE = 4
-    STALE = 5
-    NOT_FINITE = 6
-    ENVELOPE = 7
-    STEP = 8
-    FROZEN_TICK = 9
-    OVERSPEED = 10
-    LINK = 11
-    EOF_MOVING = 12
-    PAUSED = 13
-    TRAVEL = 14
-    MOVING_TIME = 15
-    CONTACT_SPEED = 16
-    SUSPENDED = 17
-    ODOMETRY = 18
 
 
 LATCH_TEXT = {

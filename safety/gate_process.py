@@ -30,7 +30,7 @@ from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
 from robot_io.log.gate_log import GateLog
-from robot_io.messages import BodyTwist, CommandEcho
+from robot_io.messages import BodyTwist, ClockOffset, CommandEcho
 from robot_io.rig.config import BaseConfig, FramesConfig
 from safety.envelope import EnvelopeLimits
 from safety.gate_shell import GateShell
@@ -93,6 +93,10 @@ class GateProcess:
             self._base.close()
             self._loop.close()
         self._status.say("finished", latch=int(self._shell.gate.latch), counters=self._base.health().counters)
+
+    def note_clock(self, offset: ClockOffset | None) -> None:
+        """Log how far the base's clock is ahead."""
+        self._log.clock(monotonic_ns(), offset)
 
     def _on_control(self, _events: int) -> None:
         self._read_control()
@@ -209,6 +213,7 @@ def main(kind: type[JobT], wrapped: Callable[[Base, JobT], Base]) -> int:
         status.error(error)
         return error.exit_code
     process = GateProcess(job, wrapped(base, job), status)
+    process.note_clock(info.clock)
     realtime = try_realtime(PRIORITY)
     status.say("ready", info=msgspec.to_builtins(info), realtime=realtime)
     for remark in info.remarks:

@@ -103,14 +103,15 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
         state, travel, lag, changes = self.gate, self.travel, self.lag, dict[str, Any]()
         pose_seq, odometry_seq = self.record.pose_seq, self.record.odometry_seq
         for sample in samples:
-            value, at_ns = sample.value, sample.received_ns
+            value, at_ns, stamp_ns = sample.value, sample.received_ns, sample.epoch_ns
             if isinstance(value, BasePose):
                 pose_seq += 1
-                changes.update(pose=value.pose, pose_valid=value.valid, pose_received_ns=at_ns)
+                changes.update(pose=value.pose, pose_valid=value.valid, pose_received_ns=at_ns, pose_stamp_ns=stamp_ns)
             elif isinstance(value, BaseOdometry):
                 odometry_seq += 1
                 lag = lag.on_stamp(at_ns, sample.device_time_s)
-                changes.update(odometry=value.twist, odometry_received_ns=at_ns, lag_ns=lag.growth_ns)
+                changes.update(odometry=value.twist, odometry_received_ns=at_ns, odometry_stamp_ns=stamp_ns)
+                changes.update(lag_ns=lag.growth_ns)
                 state = gate.on_speed(self.limits, state, value.twist)
                 travel = travel.on_speed(value.twist, at_ns)
             elif isinstance(value, BaseReport):

@@ -44,6 +44,8 @@ QUICK = (
     *("--set", "control.retreat_m=0.0"),
 )
 """Less waiting around a push; the push itself is the default one."""
+FAST_TARE = ("--set", "ft.tare_s=1")
+"""What a run gets that says nothing of its tare: the rigs' own 5 s are 4 s of waiting for every test."""
 
 
 class Ended(NamedTuple):
@@ -82,6 +84,8 @@ class Run:
             popen.setdefault("stdout", out)
             popen.setdefault("stderr", err)
             popen.setdefault("cwd", ROOT)
+            if argv[:1] == ("run",) and not any("ft.tare_s" in word for word in argv):
+                argv += FAST_TARE
             self.process = subprocess.Popen([*PUSH, *argv], env=env, start_new_session=True, **popen)
 
     @property

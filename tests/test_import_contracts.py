@@ -30,6 +30,12 @@ OFFENCES = {
         "threading, tools.run",
         {"no asyncio, no threads, no multiprocessing of ours", "the rooms of tools"},
     ),
+    "tools/report/drawing": (
+        "tools.report.page",
+        {
+            "the rooms of tools.report: pages are made of figures and facts, these of what was read from the log",
+        },
+    ),
     "control": (
         "time, safety.limits, robot_io.ipc.event_loop, sim_backend.world.plant, control.loop",
         {

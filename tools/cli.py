@@ -35,7 +35,7 @@ COMMANDS = {
     "run": Command(
         "tools.commands.run",
         "one push, on hardware, emulated or simulated",
-        ("push run emulated --distance-m 2", "push run sim --fast --seed 3 --json"),
+        ('push run emulated --distance-m 2 --note "box, 2 kg"', "push run sim --fast --trials 3 --json"),
     ),
     "stop": Command(
         "tools.commands.stop",
@@ -47,6 +47,11 @@ COMMANDS = {
         "look at every device, this machine and the rig; nothing moves",
         ("push doctor emulated", "push doctor my-rig.toml --json"),
     ),
+    "watch": Command(
+        "tools.commands.watch",
+        "force, arm and base, live; nothing moves",
+        ("push watch emulated", "push watch my-rig.toml --json"),
+    ),
     "calibrate": Command(
         "tools.commands.calibrate",
         "measure tare, frames, contact point or path, by hand; nothing is moved",
@@ -54,11 +59,6 @@ COMMANDS = {
             "push calibrate bias emulated --rehearse",
             "push calibrate frame my-rig.toml --cord 0,120,240 --apply my-rig.toml",
         ),
-    ),
-    "watch": Command(
-        "tools.commands.watch",
-        "force, arm and base, live; nothing moves",
-        ("push watch emulated", "push watch my-rig.toml --json"),
     ),
     "replay": Command(
         "tools.commands.replay",
@@ -125,24 +125,13 @@ ACTIONS = {
     "log cat": ("push log cat runs/demo --topics /safety/event", "push log cat runs/demo | head -3"),
     "log export": ("push log export runs/demo", "push log export runs/demo --topics /ft/wrench --out tables"),
     "log recover": ("push log recover runs/demo", "push log recover runs/demo --out whole.mcap"),
-    "calibrate bias": ("push calibrate bias my-rig.toml", "push calibrate bias emulated --rehearse --seconds 20"),
-    "calibrate sign": ("push calibrate sign my-rig.toml", "push calibrate sign emulated --rehearse"),
-    "calibrate frame": (
-        "push calibrate frame my-rig.toml --cord 0,120,240 --apply my-rig.toml",
-        "push calibrate frame my-rig.toml --from runs/one runs/two runs/three",
-    ),
-    "calibrate contact": (
-        "push calibrate contact my-rig.toml --apply my-rig.toml",
-        "push calibrate contact emulated --rehearse --json",
-    ),
-    "calibrate marker": (
-        "push calibrate marker my-rig.toml --apply my-rig.toml",
-        "push calibrate marker emulated --rehearse",
-    ),
-    "calibrate path": (
-        "push calibrate path my-rig.toml --two-places",
-        "push calibrate path emulated --rehearse --json",
-    ),
+    "log zip": ("push log zip runs/demo", "push log zip runs --out artifact.zip"),
+    "calibrate bias": ("push calibrate bias --rehearse", "push calibrate bias my-rig.toml --seconds 120 --json"),
+    "calibrate sign": ("push calibrate sign --rehearse", "push calibrate sign my-rig.toml --apply my-rig.toml"),
+    "calibrate frame": ("push calibrate frame my-rig.toml --cord", "push calibrate frame --from runs/one runs/two"),
+    "calibrate contact": ("push calibrate contact --rehearse", "push calibrate contact my-rig.toml --marking-mm 2"),
+    "calibrate marker": ("push calibrate marker --rehearse", "push calibrate marker my-rig.toml --out marker.toml"),
+    "calibrate path": ("push calibrate path my-rig.toml --two-places", "push calibrate path --rehearse --json"),
     "emulate ft300": ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate ft300 --streaming --latency-ms 16"),
     "emulate ur10": ("push emulate ur10", "push emulate ur10 --host 127.0.0.11 --json"),
     "emulate ridgeback": ("push emulate ridgeback", "push emulate ridgeback --port 0 --json"),

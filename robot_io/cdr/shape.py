@@ -5,7 +5,9 @@ A message is a `msgspec.Struct`; its annotations say how each field goes on the 
     float -> float64          int, IntEnum -> int64      bool -> bool       str -> string     bytes -> uint8[]
     Annotated[int, "uint8"]   any other width            tuple[X, ...] -> X[]                 Struct -> nested
     tuple[X, X, X] -> X[3]    (all of one type)  Annotated[tuple[X, ...], 36] -> X[36]
+    Annotated[int, "uint8", Mode]   stays an int; the definition names its values: uint8 MODE_STOP=5
 
+A Struct with a class variable `__ros_constants__`, lines like "byte OK=0", has them in its definition.
 ROS 2 wants field names in lower case: `force_N` is `force_n` there.
 A nested type is called `push_msgs/msg/<ClassName>` unless it has a class variable `__ros_name__`.
 """
@@ -15,7 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntEnum
 from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
@@ -40,15 +42,17 @@ PRIMITIVES: dict[str, tuple[str, int]] = {
 }
 _FLOATS = ("float32", "float64")
 _FIELD_NAME = re.compile(r"(?!.*__)(?!.*_\Z)[a-z][a-z0-9_]*\Z")
+_WORD_START = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _SEPARATOR = "=" * 80
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """One number: its ROS name, and the enum it is turned into when read."""
+    """One number: its ROS name, the enum it is turned into when read, and the one whose members name its values."""
 
     ros: str
     enum: type[Enum] | None = None
+    named_by: type[IntEnum] | None = None
 
 
 @dataclass(frozen=True)
@@ -73,11 +77,12 @@ class Many:
 
 @dataclass(frozen=True)
 class Nested:
-    """A Struct: how to call it, its ROS name, its fields in order."""
+    """A Struct: how to call it, its ROS name, its fields in order, and the lines of constants in its definition."""
 
     struct_type: Any
     ros_name: str
     fields: tuple[tuple[str, Shape], ...]
+    constants: tuple[str, ...] = ()
 
 
 Shape = Scalar | Text | Blob | Many | Nested
@@ -93,6 +98,8 @@ def shape_of(annotation: Any) -> Shape:
                 shape = Text(wide=True)
             elif isinstance(note, str):
                 shape = _with_width(shape, note, annotation)
+            elif isinstance(note, type) and issubclass(note, IntEnum) and isinstance(shape, Scalar):
+                shape = Scalar(shape.ros, shape.enum, note)
             elif isinstance(note, int) and isinstance(shape, Many):
                 shape = Many(shape.element, note)
         return shape
@@ -171,7 +178,7 @@ def _with_width(shape: Shape, note: str, annotation: Any) -> Shape:
         raise TypeError(f"{annotation!r}: {note!r} is not a ROS 2 number type")
     if (shape.ros in _FLOATS) != (note in _FLOATS) or "bool" in (shape.ros, note):
         raise TypeError(f"{annotation!r}: a {shape.ros} cannot be sent as {note}")
-    return Scalar(note, shape.enum)
+    return Scalar(note, shape.enum, shape.named_by)
 
 
 def _shape_of_tuple(annotation: Any) -> Shape:
@@ -203,7 +210,18 @@ def _shape_of_struct(annotation: Any, struct_type: type[msgspec.Struct]) -> Nest
         raise TypeError(f"{annotation!r} has no fields")
     arguments = "".join(part.__name__ for part in get_args(annotation))
     default = f"push_msgs/msg/{struct_type.__name__}{arguments}"
-    return Nested(annotation, getattr(struct_type, "__ros_name__", default), tuple(fields))
+    constants = (*getattr(struct_type, "__ros_constants__", ()), *_names_of_values(fields))
+    return Nested(annotation, getattr(struct_type, "__ros_name__", default), tuple(fields), constants)
+
+
+def _names_of_values(fields: list[tuple[str, Shape]]) -> tuple[str, ...]:
+    """Return a line for each member of the enums that name values of these fields: "uint8 LINK_STATE_UP=2"."""
+    lines = dict[str, None]()
+    for _, shape in fields:
+        if isinstance(shape, Scalar) and shape.named_by is not None:
+            prefix = _WORD_START.sub("_", shape.named_by.__name__).upper()
+            lines.update(dict.fromkeys(f"{shape.ros} {prefix}_{one.name}={one.value}" for one in shape.named_by))
+    return tuple(lines)
 
 
 def _collect(shape: Shape, into: dict[str, Nested]) -> None:
@@ -224,7 +242,9 @@ def _definition(shape: Nested) -> str:
     names = [_ros_field(name) for name, _ in shape.fields]
     if len(set(names)) != len(names):
         raise TypeError(f"two fields of {shape.ros_name} have the same ROS name")
-    return "".join(f"{_type_name(field)} {name}\n" for name, (_, field) in zip(names, shape.fields, strict=True))
+    constants = "".join(f"{line}\n" for line in shape.constants)
+    fields = (f"{_type_name(field)} {name}\n" for name, (_, field) in zip(names, shape.fields, strict=True))
+    return constants + "".join(fields)
 
 
 def _type_name(shape: Shape) -> str:

@@ -13,7 +13,15 @@ from typing import Any, NamedTuple
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.log import world_messages as world
-from robot_io.log.messages import BASE_STATUS, GATE_DECISION, LOOP_TIMING, SAFETY_EVENT
+from robot_io.log.messages import (
+    ARM_STATUS,
+    BASE_CLOCK,
+    BASE_STATUS,
+    FLAWED_SAMPLE,
+    GATE_DECISION,
+    LOOP_TIMING,
+    SAFETY_EVENT,
+)
 from robot_io.log.ros_messages import (
     DIAGNOSTIC_ARRAY,
     JOINT_STATE,
@@ -26,6 +34,7 @@ from robot_io.log.ros_messages import (
     TWIST_STAMPED,
     WRENCH_STAMPED,
 )
+from robot_io.log.signals import SIGNALS
 from robot_io.tick import TICK_CDR
 
 
@@ -42,6 +51,10 @@ class Kind(IntEnum):
     GATE_SENT = 14
     """What the gate really sent to the base."""
     GATE_DECISION = 15
+    BASE_FLAWED = 16
+    """What came from the base or the motion capture and cannot be used as it came."""
+    BASE_CLOCK = 17
+    """Once, when the base has been opened."""
     WORLD_START = 20
     WORLD_COMMAND = 21
     WORLD_STATE = 22
@@ -64,6 +77,8 @@ CHANNELS: dict[int, Channel] = {
     Kind.BASE_POSE: Channel("/base/pose", POSE_STAMPED),
     Kind.BASE_STATUS: Channel("/base/status", BASE_STATUS),
     Kind.SLIDER_POSE: Channel("/slider/pose", POSE_STAMPED),
+    Kind.BASE_CLOCK: Channel("/base/clock", BASE_CLOCK, latched=True),
+    Kind.BASE_FLAWED: Channel("/base/flawed", FLAWED_SAMPLE),
     Kind.GATE_SENT: Channel("/gate/sent", TWIST_STAMPED),
     Kind.GATE_DECISION: Channel("/gate/decision", GATE_DECISION),
     Kind.WORLD_START: Channel("/world/start", world.START_CDR),
@@ -79,6 +94,8 @@ DERIVED = (
     Channel("/ft/wrench_raw", WRENCH_STAMPED),
     Channel("/ft/wrench", WRENCH_STAMPED),
     Channel("/arm/joint_states", JOINT_STATE),
+    Channel("/arm/status", ARM_STATUS),
+    Channel("/control/signals", SIGNALS),
     Channel("/base/cmd_vel_raw", TWIST_STAMPED),
     Channel("/base/cmd_vel", TWIST_STAMPED),
     Channel("/loop/timing", LOOP_TIMING),

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 from robot_io.errors import LogDamaged, UsageError
 from robot_io.log.format_1 import arm_state
 from robot_io.log.format_2 import always, sums_count
+from robot_io.log.format_3 import not_kept
 
-LOG_FORMAT = 3
+LOG_FORMAT = 4
 FORMAT_FACT = "format"
 """Where a log's metadata `run` says its format; the first one said nothing."""
 _FIRST_FORMAT = 1
@@ -70,7 +71,12 @@ class ChangedTopic(NamedTuple):
 
 RENAMED_FIELDS: tuple[RenamedField, ...] = ()
 EARLIER_VALUES: tuple[EarlierValue, ...] = ()
-COMPUTED_VALUES = (ComputedValue("push_msgs/msg/ArmRecord", "joints.state", arm_state, 1),)
+COMPUTED_VALUES = (
+    ComputedValue("push_msgs/msg/ArmRecord", "joints.state", arm_state, 1),
+    ComputedValue("push_msgs/msg/BaseRecord", "pose_stamp_ns", not_kept, 3),
+    ComputedValue("push_msgs/msg/BaseRecord", "odometry_stamp_ns", not_kept, 3),
+    ComputedValue("push_msgs/msg/HostInput", "last_tick_ns", not_kept, 3),
+)
 NOW_OPTIONAL = (
     NowOptional("push_msgs/msg/ControlTick", "before", always, 2),
     NowOptional("push_msgs/msg/ControlState", "tare", sums_count, 2),

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from mcap.records import Attachment, Header, Message, Metadata
 
 from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
-from robot_io.log.seal import LogSeal, config_seal
+from robot_io.log.seal import LogSeal, PayloadSeal, config_seal
 from robot_io.mcap.log_file import CONFIG_ATTACHMENT, create_new, finish_writer
 from robot_io.mcap.walk import NO_SCHEMA, LogItem, Topic, walk
 from robot_io.mcap.write import McapWriter
@@ -38,7 +38,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
     stream = create_new(out_path)
     try:
         # A log by others stays one: it is not held to what our own writer would have written.
-        copy = _Copy(McapWriter(stream, first.profile, first.library))
+        copy = LogCopy(McapWriter(stream, first.profile, first.library), LogSeal())
         cause = ""
         try:
             for item in items:
@@ -67,12 +67,12 @@ def recover(path: Path, out_path: Path) -> Recovered:
     return Recovered(copy.seal.messages, cause)
 
 
-class _Copy:
-    """The records written so far, under their new numbers."""
+class LogCopy:
+    """A log being copied record by record: what was written so far, under its new numbers, and its seal."""
 
-    def __init__(self, writer: McapWriter) -> None:
+    def __init__(self, writer: McapWriter, seal: LogSeal | PayloadSeal) -> None:
         self.writer = writer
-        self.seal = LogSeal()
+        self.seal = seal
         self.config = b""
         self._schemas: dict[int, int] = {NO_SCHEMA.id: NO_SCHEMA.id}
         self._channels: dict[int, tuple[int, str]] = {}

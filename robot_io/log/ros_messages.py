@@ -194,6 +194,13 @@ class Log(msgspec.Struct, frozen=True, gc=False):
     """A line for people; level 10 debug, 20 info, 30 warning, 40 error, 50 fatal."""
 
     __ros_name__: ClassVar[str] = "rcl_interfaces/msg/Log"
+    __ros_constants__: ClassVar[tuple[str, ...]] = (
+        "byte DEBUG=10",
+        "byte INFO=20",
+        "byte WARN=30",
+        "byte ERROR=40",
+        "byte FATAL=50",
+    )
     stamp: Time
     level: UInt8
     name: str
@@ -215,6 +222,7 @@ class DiagnosticStatus(msgspec.Struct, frozen=True, gc=False):
     """State of one component; level 0 good, 1 warning, 2 error, 3 stale."""
 
     __ros_name__: ClassVar[str] = "diagnostic_msgs/msg/DiagnosticStatus"
+    __ros_constants__: ClassVar[tuple[str, ...]] = ("byte OK=0", "byte WARN=1", "byte ERROR=2", "byte STALE=3")
     level: Byte
     name: str
     message: str
@@ -243,8 +251,8 @@ DIAGNOSTIC_ARRAY = CdrType(DiagnosticArray, DiagnosticArray.__ros_name__)
 
 WORLD_FRAME, BASE_FRAME, SENSOR_FRAME = "world", "base_link", "ft_sensor"
 """The names that the frames WORLD, BODY and SENSOR have in a log."""
-UNKNOWN_COVARIANCE = (0.0,) * 36
-"""All zero says nothing of the covariance, as ROS has it (nav_msgs/Odometry)."""
+SENSOR_WORLD_FRAME = "ft_sensor_world"
+"""At the origin of the sensor, with the axes of the WORLD frame: that of the wrench on the object."""
 
 
 def ros_time(time_ns: int) -> Time:

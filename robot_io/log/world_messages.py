@@ -5,12 +5,13 @@ Times are ns of the world's own time line (CLOCK_MONOTONIC, virtual at level `si
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import msgspec
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.messages import BodyTwist, Pose2D
+from robot_io.named_values import ContactMode
 
 
 class WorldStart(msgspec.Struct, frozen=True, gc=False):
@@ -43,7 +44,7 @@ class WorldState(msgspec.Struct, frozen=True, gc=False):
     force_y: float
     contact_x: float
     contact_y: float
-    contact_mode: int
+    contact_mode: Annotated[int, "uint8", ContactMode]
 
 
 class WorldStall(msgspec.Struct, frozen=True, gc=False):

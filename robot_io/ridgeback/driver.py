@@ -19,6 +19,7 @@ from robot_io.clock import NS_PER_MS, NS_PER_S, ClockNs, monotonic_ns
 from robot_io.driver import DriverBase, no_more_options
 from robot_io.errors import ConfigError, DeviceUnreachable
 from robot_io.messages import BaseFeed, BodyTwist, CommandEcho, DeviceHealth, DeviceInfo, LinkState, Pose2D, Stamped
+from robot_io.ridgeback.clock_offset import ask_clock
 from robot_io.ridgeback.echo_watch import EchoWatch
 from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
 from robot_io.ridgeback.intake import Intake
@@ -114,6 +115,7 @@ class Ridgeback(DriverBase):
         self._link = link = WebSocketLink.connect(self.url, self._clock)
         try:
             answers = check_topics(link, self.url, self._topic, {self._topic: self._type, **self._types}, self._clock)
+            offset = None if answers.unanswered else ask_clock(link, self._clock)
             join(link, self._topic, self._type, self._types)
         except LinkLost as lost:
             self._give_up(str(lost))
@@ -122,7 +124,7 @@ class Ridgeback(DriverBase):
             self.close()
             raise
         self._counters["unanswered_checks"] = len(answers.unanswered)
-        return DeviceInfo("ridgeback", self.url, "Ridgeback", link.server, remarks=answers.remarks(self._topic))
+        return DeviceInfo("ridgeback", self.url, "Ridgeback", link.server, "", answers.remarks(self._topic), offset)
 
     def start(self) -> None:
         """Wait for the first message of pose, odometry and status, which comes once a second; at most 4 s.
@@ -212,8 +214,7 @@ class Ridgeback(DriverBase):
 
     def close(self) -> None:
         """Close the connection within 0.05 s; the bridge forgets us by itself. Idempotent, never raises."""
-        link, self._link = self._link, None
-        self._started = False
+        link, self._link, self._started = self._link, None, False
         if link is not None:
             self._announce(link)
             link.close()
@@ -228,8 +229,7 @@ class Ridgeback(DriverBase):
         self._counters = dict.fromkeys(self._counters, 0)
 
     def _receive(self) -> None:
-        link = self._link
-        if link is None:
+        if (link := self._link) is None:
             return
         try:
             samples = self._intake.take(link)

@@ -23,8 +23,6 @@ from robot_io.ridgeback.rosbridge_messages import (
 )
 from robot_io.rig.topics import TopicsConfig
 
-_NAN = float("nan")
-
 
 def with_full_names(topics: TopicsConfig) -> TopicsConfig:
     """Return the same topics with every name beginning with a slash: rosapi compares names as they are written."""
@@ -106,22 +104,22 @@ class FeedReader:
         topics = self._topics
         if topic == topics.odometry:
             odometry = decode_odometry(message.msg)
-            stamp_s = odometry.reading.stamp_s
-            samples.append(self._stamped("odometry", BaseOdometry(odometry.twist), received_ns, stamp_s))
+            value = BaseOdometry(odometry.twist, odometry.pose)
+            samples.append(self._stamped("odometry", value, received_ns, odometry.reading))
             if self._pose_source == "odometry":
                 samples.append(self._base_pose(odometry.reading, received_ns))
         elif topic == self._pose_topic:
             decode = decode_transform if self._pose_source == "mocap" else decode_joint_states
             samples.append(self._base_pose(decode(message.msg), received_ns))
         elif topic == topics.status:
-            samples.append(self._stamped("status", BaseReport(decode_status(message.msg)), received_ns, _NAN))
+            samples.append(self._stamped("status", BaseReport(decode_status(message.msg)), received_ns))
         elif topic == topics.slider_pose:
             reading = decode_transform(message.msg)
             slider = SliderPose(reading.pose, reading.flaw or self._wrong_frame(topic, reading))
-            samples.append(self._stamped("slider", slider, received_ns, reading.stamp_s))
+            samples.append(self._stamped("slider", slider, received_ns, reading))
         elif topic == topics.command:
             echo = CommandEcho(decode_twist(message.msg, topics.command_type))
-            samples.append(self._stamped("echo", echo, received_ns, _NAN))
+            samples.append(self._stamped("echo", echo, received_ns))
         else:
             self.counters["unasked"] += 1
         self._heard.add(topic)
@@ -139,7 +137,7 @@ class FeedReader:
             if self._origin is None:
                 self._origin = inverse(pose)
             pose = compose(self._origin, pose)
-        return self._stamped("pose", BasePose(pose, flaw), received_ns, reading.stamp_s)
+        return self._stamped("pose", BasePose(pose, flaw), received_ns, reading)
 
     def _wrong_frame(self, topic: str, reading: PoseReading) -> str:
         frames = (reading.frame, reading.child_frame)
@@ -148,7 +146,11 @@ class FeedReader:
             "" if frames == first else f"pose of {frames[1]!r} in {frames[0]!r}, expected {first[1]!r} in {first[0]!r}"
         )
 
-    def _stamped(self, kind: str, value: BaseFeed, received_ns: int, stamp_s: float) -> Stamped[BaseFeed]:
+    def _stamped(
+        self, kind: str, value: BaseFeed, received_ns: int, reading: PoseReading | None = None
+    ) -> Stamped[BaseFeed]:
         seq = self.counters[kind]
         self.counters[kind] = seq + 1
-        return Stamped(value, seq, received_ns, stamp_s)
+        if reading is None:
+            return Stamped(value, seq, received_ns)
+        return Stamped(value, seq, received_ns, reading.stamp_s, reading.stamp_ns)

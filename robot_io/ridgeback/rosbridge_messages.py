@@ -14,8 +14,10 @@ from typing import Annotated, TypeVar
 
 import msgspec
 
+from robot_io.clock import NS_PER_S
 from robot_io.geometry import yaw_from_quaternion
 from robot_io.messages import BaseStatus, BodyTwist, Pose2D
+from robot_io.odometry_pose import NO_COVARIANCE, OdometryPose
 
 T = TypeVar("T")
 _NAN = float("nan")
@@ -23,13 +25,20 @@ Number = float | None
 
 
 class PoseReading(msgspec.Struct, frozen=True, gc=False):
-    """A pose as a message gives it: m, rad, frames by name, the sender's clock in s; `flaw` is "" when usable."""
+    """A pose as a message gives it: m, rad, frames by name, the sender's clock; `flaw` is "" when usable."""
 
     pose: Pose2D
     flaw: str
     frame: str
     child_frame: str
-    stamp_s: float
+    stamp_ns: int
+    """ns since 1970 by the sender's clock; 0 where it gives none."""
+
+    @property
+    def stamp_s(self) -> float:
+        """Return the stamp in s."""
+        whole, part = divmod(self.stamp_ns, NS_PER_S)
+        return whole + part * 1e-9
 
 
 class OdometryReading(msgspec.Struct, frozen=True, gc=False):
@@ -37,6 +46,8 @@ class OdometryReading(msgspec.Struct, frozen=True, gc=False):
 
     reading: PoseReading
     twist: BodyTwist
+    pose: OdometryPose | None
+    """Pose and covariances as they came; None where a number of the pose is null."""
 
 
 def is_stamped(type_name: str) -> bool:
@@ -102,10 +113,12 @@ class _TwistStamped(msgspec.Struct, gc=False):
 
 class _PoseWithCovariance(msgspec.Struct, gc=False):
     pose: _Pose
+    covariance: list[Number] = []
 
 
 class _TwistWithCovariance(msgspec.Struct, gc=False):
     twist: _Twist
+    covariance: list[Number] = []
 
 
 class _Odometry(msgspec.Struct, gc=False):
@@ -158,7 +171,8 @@ def decode_odometry(msg: bytes) -> OdometryReading:
     """Decode a nav_msgs/Odometry."""
     m = _decode_odometry(msg)
     pose = m.pose.pose
-    return OdometryReading(_reading(m.header, m.child_frame_id, pose.position, pose.orientation), _body(m.twist.twist))
+    reading = _reading(m.header, m.child_frame_id, pose.position, pose.orientation)
+    return OdometryReading(reading, _body(m.twist.twist), _as_sent(m))
 
 
 def decode_joint_states(msg: bytes) -> PoseReading:
@@ -167,7 +181,7 @@ def decode_joint_states(msg: bytes) -> PoseReading:
     by_name = dict(zip(m.name, m.position, strict=False))
     x, y, yaw = (_number(by_name.get(name)) for name in ("x", "y", "yaw"))
     flaw = "" if all(map(math.isfinite, (x, y, yaw))) else "x, y or yaw is missing or null"
-    return PoseReading(Pose2D(x, y, math.remainder(yaw, math.tau)), flaw, m.header.frame_id, "", _seconds(m.header))
+    return PoseReading(Pose2D(x, y, math.remainder(yaw, math.tau)), flaw, m.header.frame_id, "", _stamp_ns(m.header))
 
 
 def decode_status(msg: bytes) -> BaseStatus:
@@ -185,9 +199,25 @@ def _number(value: Number) -> float:
     return _NAN if value is None else value
 
 
-def _seconds(header: _Header) -> float:
+def _stamp_ns(header: _Header) -> int:
     stamp = header.stamp
-    return (stamp.secs or stamp.sec) + (stamp.nsecs or stamp.nanosec) * 1e-9
+    return (stamp.secs or stamp.sec) * NS_PER_S + (stamp.nsecs or stamp.nanosec)
+
+
+def _as_sent(m: _Odometry) -> OdometryPose | None:
+    at, turned = m.pose.pose.position, m.pose.pose.orientation
+    position = (_number(at.x), _number(at.y), _number(at.z))
+    orientation = (_number(turned.x), _number(turned.y), _number(turned.z), _number(turned.w))
+    if not all(map(math.isfinite, (*position, *orientation))):
+        return None
+    covariances = _covariance(m.pose.covariance), _covariance(m.twist.covariance)
+    return OdometryPose(m.header.frame_id, m.child_frame_id, position, orientation, *covariances)
+
+
+def _covariance(values: list[Number]) -> tuple[float, ...]:
+    """Return a covariance; one with a null in it, or of another size, says nothing."""
+    numbers = tuple(_number(value) for value in values)
+    return numbers if len(numbers) == len(NO_COVARIANCE) and all(map(math.isfinite, numbers)) else NO_COVARIANCE
 
 
 def _body(twist: _Twist) -> BodyTwist:
@@ -204,4 +234,4 @@ def _reading(header: _Header, child: str, position: _Vector, q: _Quaternion) -> 
     elif yaw is None:
         flaw = "the rotation is not an upright unit quaternion"
     pose = Pose2D(x, y, _NAN if yaw is None else yaw)
-    return PoseReading(pose, flaw, header.frame_id, child, _seconds(header))
+    return PoseReading(pose, flaw, header.frame_id, child, _stamp_ns(header))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import msgspec
 
 from robot_io.messages import Vector3, Vector6
+from robot_io.named_values import Refusal
 from robot_io.tick.field_types import Counts6
 
 _ZERO6: Vector6 = (0.0,) * 6
@@ -92,11 +93,11 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     """What control remembers from tick to tick."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/ControlState"
-    phase: int = 0
+    phase: Annotated[int, "uint8", Phase] = 0
     phase_since_ns: int = 0
     tared: bool = False
-    refusal: int = 0
-    """Why the start was refused: 0 not, 1 unsettled, 2 nearly saturated, 3 dead axis, 4 implausible force."""
+    refusal: Annotated[int, "uint8", Refusal] = 0
+    """Why the start was refused."""
     bias_force: Vector3 = (0.0, 0.0, 0.0)
     bias_torque: Vector3 = (0.0, 0.0, 0.0)
     tare: tuple[TareSums, ...] = ()

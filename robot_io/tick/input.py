@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import msgspec
 
-from robot_io.messages import ArmRecord, BaseRecord, Vector3
+from robot_io.messages import ArmRecord, BaseRecord, LinkState, Vector3
 
 
 class Operator(IntEnum):
@@ -33,7 +33,7 @@ class FtInput(msgspec.Struct, frozen=True, gc=False):
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/FtInput"
     readings: tuple[FtReading, ...]
-    link: int
+    link: Annotated[int, "uint8", LinkState]
     packets_ok: int
     crc_fail: int
     junk_bytes: int
@@ -56,6 +56,8 @@ class HostInput(msgspec.Struct, frozen=True, gc=False):
     """How long the recorder has taken nothing of what waited for it."""
     asleep_ns: int = 0
     """CLOCK_BOOTTIME minus CLOCK_MONOTONIC: grows only while this machine is suspended (0 at level sim)."""
+    last_tick_ns: int = 0
+    """How long the tick before this one took, from its waking to the end of its record (0 at level sim)."""
 
 
 class TickInput(msgspec.Struct, frozen=True, gc=False):
@@ -64,7 +66,7 @@ class TickInput(msgspec.Struct, frozen=True, gc=False):
     __ros_name__: ClassVar[str] = "push_msgs/msg/TickInput"
     tick: int
     now_ns: int
-    operator: int
+    operator: Annotated[int, "uint8", Operator]
     host: HostInput
     ft: FtInput
     arm: ArmRecord

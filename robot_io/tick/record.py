@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import msgspec
 
@@ -11,7 +11,7 @@ from robot_io.messages import BodyTwist, WorldTwist
 from robot_io.tick.control_state import ControlState
 from robot_io.tick.field_types import U32
 from robot_io.tick.input import TickInput
-from robot_io.tick.safety_state import EnvelopeState, SafetyState
+from robot_io.tick.safety_state import EnvelopeState, Mode, SafetyState
 
 
 class TickState(msgspec.Struct, frozen=True, gc=False):
@@ -27,7 +27,7 @@ class TickOutput(msgspec.Struct, frozen=True, gc=False):
     """What the tick says."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/TickOutput"
-    mode: int
+    mode: Annotated[int, "uint8", Mode]
     faults: tuple[str, ...]
     wanted_world: WorldTwist
     wanted_body: BodyTwist
@@ -38,7 +38,7 @@ class TickOutput(msgspec.Struct, frozen=True, gc=False):
     contact_y: float
     """Contact ball centre, m, WORLD frame."""
     finished: bool
-    exit_code: int
+    exit_code: Annotated[int, "uint8"]
     fault_values: tuple[float, ...] = ()
     """What was measured for each of `faults`, in the unit of its row; NaN where nothing is."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import msgspec
 
@@ -77,7 +77,7 @@ class MotionState(msgspec.Struct, frozen=True, gc=False):
     """How far the base has come: by pose, by odometry and by what was sent to it."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/MotionState"
-    group: int = 0
+    group: Annotated[int, "uint8"] = 0
     """0 before the first motion, 1 approach, 2 push, 3 retreat; what follows counts within it."""
     at_ns: int = 0
     sent_m: float = 0.0
@@ -143,7 +143,7 @@ class SafetyState(msgspec.Struct, frozen=True, gc=False):
     """What safety remembers from tick to tick."""
 
     __ros_name__: ClassVar[str] = "push_msgs/msg/SafetyState"
-    mode: int = 0
+    mode: Annotated[int, "uint8", Mode] = 0
     first_ns: int = 0
     """When the first tick ran."""
     latched: tuple[str, ...] = ()

@@ -2,21 +2,9 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import msgspec
 
-
-class ContactMode(IntEnum):
-    """State of the contact; left and right as seen along the inward normal."""
-
-    STICKING = 0
-    SLIDING_LEFT = 1
-    SLIDING_RIGHT = 2
-    FREE = 3
-    """No contact, or none that needs a force."""
-    HOLDING = 4
-    """Ball at rest in contact: the last force is kept."""
+from robot_io.named_values import ContactMode as ContactMode
 
 
 class ContactOutcome(msgspec.Struct, frozen=True, gc=False):

@@ -11,7 +11,7 @@ import math
 from collections import Counter
 from typing import Literal
 
-from robot_io.clock import NS_PER_S, ClockNs
+from robot_io.clock import NS_PER_S, SIM_WALL_OFFSET_NS, ClockNs
 from robot_io.driver import DriverBase
 from robot_io.errors import DeviceNotReady
 from robot_io.geometry import compose
@@ -22,6 +22,7 @@ from robot_io.messages import (
     BaseReport,
     BaseStatus,
     BodyTwist,
+    ClockOffset,
     CommandEcho,
     DeviceHealth,
     DeviceInfo,
@@ -30,6 +31,7 @@ from robot_io.messages import (
     SliderPose,
     Stamped,
 )
+from robot_io.odometry_pose import OdometryPose
 from sim_backend.ridgeback.feeds import seen_from
 from sim_backend.ridgeback.noise import FeedNoise
 from sim_backend.ridgeback.settings import RidgebackSettings
@@ -80,7 +82,7 @@ class SimRidgeback(DriverBase):
     def open(self) -> DeviceInfo:
         """Return the device's identity; there is nothing to connect to."""
         self._state = LinkState.OPENING
-        return DeviceInfo("ridgeback", "simulated", "Ridgeback")
+        return DeviceInfo("ridgeback", "simulated", "Ridgeback", clock=ClockOffset(0.0, 0.0))
 
     def start(self) -> None:
         """Start the feeds now. Raises DeviceNotReady when not open."""
@@ -153,9 +155,11 @@ class SimRidgeback(DriverBase):
         samples: list[Stamped[BaseFeed]] = []
         if kind == "odometry":
             twist = self._odometry_noise.twist(truth.twist)
-            samples.append(self._stamped("odometry", BaseOdometry(twist), arrival_ns, t_ns))
+            pose = seen_from(self._origin, truth.rolled)
+            turned = (0.0, 0.0, math.sin(0.5 * pose.yaw), math.cos(0.5 * pose.yaw))
+            sent = OdometryPose("odom", "base_link", (pose.x, pose.y, 0.0), turned)
+            samples.append(self._stamped("odometry", BaseOdometry(twist, sent), arrival_ns, t_ns))
             if self._pose_source == "odometry":
-                pose = seen_from(self._origin, truth.rolled)
                 samples.append(self._stamped("pose", BasePose(pose), arrival_ns, t_ns))
             return samples
         if self._pose_source != "odometry":
@@ -174,4 +178,4 @@ class SimRidgeback(DriverBase):
     def _stamped(self, kind: str, value: BaseFeed, arrival_ns: int, t_ns: int) -> Stamped[BaseFeed]:
         seq = self._seq[kind]
         self._seq[kind] = seq + 1
-        return Stamped(value, seq, arrival_ns, t_ns / NS_PER_S)
+        return Stamped(value, seq, arrival_ns, t_ns / NS_PER_S, t_ns + SIM_WALL_OFFSET_NS)

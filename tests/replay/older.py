@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.cdr.schema import type_from_schema
 from robot_io.cdr.shape import Many, Nested, Shape
-from robot_io.log.channels import Channel
+from robot_io.log.channels import CHANNELS, Channel, Kind
+from robot_io.mcap.read import read_log, read_summary
 from robot_io.tick import TICK_CDR, ControlTick
 from tests.replay.runs import as_logged
 from tools.log import run_log
+from tools.log.derivation import Derivation
 from tools.log.run_log import RunLog
 
 EditText = Callable[[str], str]
@@ -74,8 +77,26 @@ def write_older(
     older = older_type(TICK_CDR, edit)
     with monkeypatch.context() as patch:
         patch.setitem(run_log.BY_TOPIC, "/control/tick", Channel("/control/tick", older))
+        patch.setattr(run_log, "Derivation", partial(Derivation, log_format=int(facts["format"])))
         log = RunLog(path, config_text=config, metadata=facts, wall_offset_ns=10**18)
         for tick in as_logged(ticks):
             log.tick(tick.input.now_ns, older.encode(as_older(older.shape, tick, more)), tick)
         log.finish({})
     return path
+
+
+def derived_as(path: Path, out: Path, log_format: int, monkeypatch: Any) -> Path:
+    """Write a log of today with the topics that one of an earlier format derived; its own records are as they are."""
+    summary = read_summary(path)
+    facts = {**summary.metadata["run"], "format": str(log_format)}
+    offset_ns = int(facts["wall_offset_ns"])
+    kinds = {channel.topic: kind for kind, channel in CHANNELS.items() if kind not in (Kind.SAFETY_EVENT, Kind.ROSOUT)}
+    with monkeypatch.context() as patch:
+        patch.setattr(run_log, "Derivation", partial(Derivation, log_format=log_format))
+        config = summary.attachments["config.toml"].decode()
+        log = RunLog(out, config_text=config, metadata=facts, wall_offset_ns=offset_ns)
+        for message in read_log(path):
+            if message.topic in kinds:
+                log.record(kinds[message.topic], message.log_time_ns - offset_ns, message.payload)
+        log.finish({})
+    return out

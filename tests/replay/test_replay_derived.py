@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from mcap.records import Message
 
-from robot_io.log import log_format
 from robot_io.log.channels import BY_TOPIC
+from robot_io.log.log_format import FORMAT_FACT, LOG_FORMAT
 from robot_io.log.messages import SAFETY_EVENT, SafetyEvent
 from robot_io.log.ros_messages import Header, ros_time
 from robot_io.rig.config import load_rig, rig_to_toml
@@ -22,9 +22,11 @@ from tools.replay.fold import replay
 
 DIFFERS, DAMAGED = 7, 8
 TOPICS = (
-    "/ft/wrench_raw", "/ft/wrench", "/arm/joint_states", "/base/cmd_vel_raw", "/base/cmd_vel", "/loop/timing",
-    "/diagnostics", "/tf", "/tf_static", "/robot_description", "/path", "/safety/event", "/rosout",
+    "/ft/wrench_raw", "/ft/wrench", "/arm/joint_states", "/arm/status", "/control/signals", "/base/cmd_vel_raw",
+    "/base/cmd_vel", "/loop/timing", "/diagnostics", "/tf", "/tf_static", "/robot_description", "/path",
+    "/safety/event", "/rosout",
 )  # fmt: skip
+FACTS = {FORMAT_FACT: str(LOG_FORMAT)}
 QUICKLY = ("/ft/wrench", "/tf", "/safety/event")
 SOME_TOPICS = [t if t in QUICKLY else pytest.param(t, marks=pytest.mark.long) for t in TOPICS]
 
@@ -95,18 +97,16 @@ def test_a_message_at_another_time_is_found(sim_log, tmp_path, capsys):
     assert first_of(resealed(sim_log, tmp_path / "run.mcap", late), capsys)[0] == DIFFERS
 
 
-def test_an_invented_event_is_found_and_the_gate_s_own_word_is_none(sim_ticks, sim_run, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(log_format, "CHANGED_TOPICS", ())  # the log below names no format, but its texts are today's
-
+def test_an_invented_event_is_found_and_the_gate_s_own_word_is_none(sim_ticks, sim_run, tmp_path, capsys):
     def log_with(name: str, text: str) -> Path:
         config = (sim_run / "config.toml").read_text()
-        log = RunLog(tmp_path / name, config_text=config, metadata={}, wall_offset_ns=10**18)
+        log = RunLog(tmp_path / name, config_text=config, metadata=FACTS, wall_offset_ns=10**18)
         for tick in sim_ticks[:50]:
             log.tick(tick.input.now_ns, TICK_CDR.encode(tick), tick)
         at_ns = sim_ticks[20].input.now_ns
         header = Header(ros_time(at_ns + 10**18), "base_link")
         log.record(31, at_ns, SAFETY_EVENT.encode(SafetyEvent(header, 20, "fault", "F36", text, 5, 5)))
-        log.finish({})
+        log.finish({"dropped_gate": "1"})
         return tmp_path / name
 
     assert first_of(log_with("gate.mcap", "gate: no frame in time"), capsys)[0] == 0
@@ -174,13 +174,13 @@ def test_what_cannot_be_derived_is_a_difference_and_no_traceback(sim_ticks, tmp_
     """A tick of a far future has no ROS time; the recorder would not have written it."""
     rig = rig_to_toml(load_rig("sim"))
     path = tmp_path / "run.mcap"
-    log = RunLog(path, config_text=rig, metadata={}, wall_offset_ns=0)
+    log = RunLog(path, config_text=rig, metadata=FACTS, wall_offset_ns=0)
     tick = sim_ticks[0]
     log.tick(tick.input.now_ns, TICK_CDR.encode(tick), tick)
     log.finish({})
     found = replay(path)
     assert not found.derived.first_difference
-    core = derived.DerivedReplayer(load_rig("sim"), 2**63 - 1, (), 2)
+    core = derived.DerivedReplayer(load_rig("sim"), 2**63 - 1, (), LOG_FORMAT)
     core.tick(tick, 5)
     first = core.result(complete=True).first_difference
     assert first is not None

@@ -14,7 +14,7 @@ from robot_io.log.world_messages import STATE_CDR
 from robot_io.mcap.read import read_log, read_summary
 from robot_io.rig.config import rig_from_toml
 from robot_io.tick import ControlTick
-from tests.replay.older import EditText, as_older, instead, older_type, without, write_older
+from tests.replay.older import EditText, as_older, derived_as, instead, older_type, without, write_older
 from tests.replay.runs import Edit, Messages, changed, replayed, resealed, rewritten, with_input
 from tools.cli import main
 from tools.run.tick_core import TickCore
@@ -132,7 +132,7 @@ def test_a_missing_field_means_what_it_meant_then(older_log, some_ticks, capsys,
     """Without the arm's link every tick would see a lost arm."""
     link = {tick.input.arm.link for tick in some_ticks}
     assert len(link) == 1
-    edit = lambda text: text.replace("int64 changed_ns\nint64 link\n", "int64 changed_ns\n")  # noqa: E731
+    edit = lambda text: text.replace("int64 changed_ns\nuint8 link\n", "int64 changed_ns\n")  # noqa: E731
     log = older_log(some_ticks, edit)
     assert replayed(capsys, log)[0] == DIFFERS
     monkeypatch.setattr(log_format, "EARLIER_VALUES", (EarlierValue("push_msgs/msg/ArmRecord", "link", link.pop(), 1),))
@@ -155,7 +155,7 @@ def test_a_topic_that_was_derived_in_another_way_is_said_and_not_compared(
 
 def test_a_world_with_another_state_is_run_again_and_compared_by_what_both_have(sim_log, tmp_path, capsys):
     """Every state without the contact's mode; the log sealed as such a program would have."""
-    older = older_type(STATE_CDR, without("int64 contact_mode"))
+    older = older_type(STATE_CDR, without("uint8 contact_mode"))
 
     def strip(data: bytes) -> bytes:
         return older.encode(as_older(older.shape, STATE_CDR.decode(data), {}))
@@ -216,8 +216,9 @@ def payload_sum(messages: Messages) -> str:
 
 
 @pytest.mark.parametrize("seal", ["payloads", "none"])
-def test_the_seals_of_early_logs_cover_what_they_covered(seal, sim_log, tmp_path, capsys):
+def test_the_seals_of_early_logs_cover_what_they_covered(seal, sim_log, tmp_path, capsys, monkeypatch):
     kept: Messages = []
+    early_log = derived_as(sim_log, tmp_path / "early.mcap", 1, monkeypatch)
 
     def write(name: str, edit: Edit, *, later: Edit = lambda messages: messages) -> Path:
         def sealed_then_edited(messages: Messages) -> Messages:
@@ -229,7 +230,7 @@ def test_the_seals_of_early_logs_cover_what_they_covered(seal, sim_log, tmp_path
             early = {key: value for key, value in values.items() if key not in ours}
             return {**early, "payload_sum": payload_sum(kept)} if (name, seal) == ("run_end", "payloads") else early
 
-        return rewritten(sim_log, tmp_path / name, sealed_then_edited, metadata=facts)
+        return rewritten(early_log, tmp_path / name, sealed_then_edited, metadata=facts)
 
     code, told = replayed(capsys, write("whole.mcap", lambda messages: messages))
     assert (code, told["identical"]) == (0, told["ticks"])

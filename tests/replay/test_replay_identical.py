@@ -7,11 +7,13 @@ import json
 import pytest
 from mcap.reader import make_reader
 
+from robot_io.log.log_format import LOG_FORMAT
 from tests.replay.runs import replayed, rewritten
 from tools.cli import main
 
 DERIVED = (
-    "/ft/wrench_raw", "/ft/wrench", "/arm/joint_states", "/base/cmd_vel_raw", "/base/cmd_vel", "/loop/timing",
+    "/ft/wrench_raw", "/ft/wrench", "/arm/joint_states", "/arm/status", "/control/signals", "/base/cmd_vel_raw",
+    "/base/cmd_vel", "/loop/timing",
     "/diagnostics", "/tf", "/tf_static", "/robot_description", "/path", "/safety/event", "/rosout",
 )  # fmt: skip
 
@@ -41,7 +43,7 @@ def test_every_tick_and_every_state_of_the_world_is_identical(level, request, ca
             "first_difference": None,
         },
         "complete": True,
-        "made_by": told["made_by"] | {"format": 3},
+        "made_by": told["made_by"] | {"format": LOG_FORMAT},
         "notes": [],
         "machine_differences": [],
     }

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from robot_io.log.log_format import LOG_FORMAT
 from tests.replay.runs import changed, replayed, rewritten
 from tools.cli import main
 from tools.replay import verified_log
@@ -14,7 +15,7 @@ from tools.replay.code_origin import compare_code
 
 USAGE, DIFFERS, DAMAGED = 2, 7, 8
 THEN, NOW = "1" * 40, "2" * 40
-CLEAN = {"format": "3", "program": "single-point-push 0.1.0", "commit": NOW, "dirty": "False"}
+CLEAN = {"format": str(LOG_FORMAT), "program": "single-point-push 0.1.0", "commit": NOW, "dirty": "False"}
 
 Metadata = Callable[[str, dict[str, str]], dict[str, str]]
 
@@ -71,7 +72,7 @@ def test_identical_ticks_verify_with_a_note_of_the_code(name, sim_log, tmp_path,
     code, as_json = replayed(capsys, log)
     assert code == 0
     assert as_json["made_by"] == {
-        "format": 3,
+        "format": LOG_FORMAT,
         "commit": changes["commit"] or "",
         "dirty": changes["dirty"] == "True",
         "other": bool(words),
@@ -153,16 +154,17 @@ def test_a_config_that_only_other_code_could_use_is_no_damage(sim_log, tmp_path,
 
 
 def test_a_later_format_is_refused_in_true_words_and_still_looked_into(sim_ticks, write_log, tmp_path, capsys):
-    said = {"format": "4", "program": "single-point-push 0.9"}
+    later = LOG_FORMAT + 1
+    said = {"format": str(later), "program": "single-point-push 0.9"}
     log = write_log(tmp_path / "run.mcap", sim_ticks[:5], said)
     for command in (["replay", str(log)], ["report", str(log), "--out", str(tmp_path)]):
         assert main(command) == USAGE
         told_words = capsys.readouterr().err
-        assert "format 4" in told_words
-        assert "up to 3" in told_words
+        assert f"format {later}" in told_words
+        assert f"up to {LOG_FORMAT}" in told_words
         assert "single-point-push 0.9" in told_words
     assert main(["log", "info", str(log)]) == 0
-    assert "format = 4" in capsys.readouterr().out
+    assert f"format = {later}" in capsys.readouterr().out
     assert main(["log", "cat", str(log), "--topics", "/loop/timing"]) == 0
 
 
@@ -175,7 +177,7 @@ def test_a_format_that_is_no_number_is_damage(said, sim_log, tmp_path, capsys):
 
 
 def test_two_installations_without_a_checkout_are_told_apart_by_their_version():
-    installed = {"program": "single-point-push 0.1.0", "format": "3"}
-    assert not compare_code(installed, installed, 3).other
-    assert compare_code({**installed, "program": "single-point-push 0.2.0"}, installed, 3).other
+    installed = {"program": "single-point-push 0.1.0", "format": str(LOG_FORMAT)}
+    assert not compare_code(installed, installed, LOG_FORMAT).other
+    assert compare_code({**installed, "program": "single-point-push 0.2.0"}, installed, LOG_FORMAT).other
     assert compare_code({"program": "single-point-push 0.1.0"}, installed, 1).other

@@ -174,7 +174,9 @@ def test_a_base_that_goes_another_way_than_sent_is_caught_within_30_centimetres_
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_quarter_too_slow_is_caught_within_3_seconds_in_spite_of_noise(seed):
-    rig = with_faults(resolve_rig("sim", ("control.distance_m=1.5",)), ("base.command.scaled=0.75 at 6 s",))
+    rig = with_faults(
+        resolve_rig("sim", ("control.distance_m=1.5", "ft.tare_s=1")), ("base.command.scaled=0.75 at 6 s",)
+    )
     found = []
     Lockstep(rig, seed, Nothing()).run(lambda inp, _state, output: found.append((inp.tick, output.faults)))
     first = next(tick for tick, faults in found if "F33-way" in faults)

@@ -22,7 +22,6 @@ from robot_io.errors import EnvironmentFault
 from robot_io.mcap.read import read_summary
 from robot_io.rig.config import rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick, TickState
-from tools.kinds import device_names
 from tools.log.tick_topics import TickTopics
 from tools.rig import resolve_rig
 from tools.run.lockstep import Lockstep, open_log
@@ -123,7 +122,7 @@ def time_tick_parts(folder: Path) -> dict[str, float]:
             TICK_CDR.encode(tick)
 
     def derive() -> None:
-        topics = TickTopics(0, device_names(rig))
+        topics = TickTopics(rig, 0)
         for tick in ticks:
             topics.expand(tick)
 

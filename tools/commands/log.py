@@ -1,4 +1,4 @@
-"""`push log info|cat|export|recover LOG`: inspect a log, print it, export it as tables, repair a truncated one.
+"""`push log info|cat|export|recover|zip`: inspect a log, print or export it, repair a truncated one, pack runs.
 
 A log is verified to its last byte before its content is used; a damaged one ends with exit code 8 and what to do.
 """
@@ -20,7 +20,9 @@ from robot_io.error_report import SCHEMA, printable, say_json, tell
 from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
 from robot_io.log.recovery import recover
 from robot_io.mcap.read import LogSummary, read_summary
+from tools.commands import log_zip
 from tools.log.decode import Decoders, columns
+from tools.log.signal_table import WRITERS, signal_rows
 from tools.places.find_log import find_log
 from tools.places.stream_file import as_file, is_stream
 from tools.terminal.arguments import named_path
@@ -31,18 +33,28 @@ DO_OTHER_TOOL = "Read it with the tool that wrote it; `push log info` lists all 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the actions and their flags."""
-    actions = parser.add_subparsers(dest="action", required=True, metavar="info|cat|export|recover")
+    actions = parser.add_subparsers(dest="action", required=True, metavar="info|cat|export|recover|zip")
     info = actions.add_parser("info", help="show what the log holds, with every byte verified")
     cat = actions.add_parser("cat", help="print every message as one line of JSON; NaN and infinities become null")
     export = actions.add_parser("export", help="write one CSV file per topic, units in the header line")
     saved = actions.add_parser("recover", help="repair a truncated log")
+    log_zip.add_arguments(actions.add_parser("zip", help="pack runs for others, without addresses and names"))
     for action in (info, cat, export, saved):
         action.add_argument("log", type=named_path, help="run.mcap, a run's folder, or - for a pipe")
         action.add_argument("--json", action="store_true", help="one JSON object on stdout, last")
     for action in (cat, export):
         action.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these topics")
     export.add_argument(
-        "--out", type=named_path, metavar="DIR", help="directory for the tables (default: LOG without .mcap, plus _csv)"
+        "--signals",
+        action="store_true",
+        help="one table instead, of /control/signals: what one plots, a row for each tick",
+    )
+    export.add_argument("--to", choices=("csv", "parquet"), default="csv", help="parquet: with --signals only")
+    export.add_argument(
+        "--out",
+        type=named_path,
+        metavar="PATH",
+        help="folder for the tables (default: LOG without .mcap, plus _csv); with --signals the file",
     )
     saved.add_argument(
         "--out", type=named_path, metavar="FILE", help="the new log (default: LOG without .mcap, plus _recovered.mcap)"
@@ -51,6 +63,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the action; return 0. Raises UsageError, EnvironmentFault or LogDamaged."""
+    if args.action == "zip":
+        facts = log_zip.run(args)
+        if args.json:
+            say_json({"schema": SCHEMA, "log": str(args.log), **facts})
+        return 0
     args.named = STANDARD_INPUT if args.log == Path("-") else find_log(args.log)
     actions = {"info": _info, "cat": _cat, "export": _export, "recover": _recover}
     unnamed = args.named == STANDARD_INPUT or is_stream(args.named)
@@ -107,6 +124,12 @@ def _cat(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:
+    if args.signals:
+        return _export_signals(args)
+    if args.to != "csv":
+        raise UsageError(
+            "one table for each topic is CSV", do="Add --signals for one table as Parquet, or leave out --to"
+        )
     out: Path = args.out or args.log.with_name(f"{args.log.stem}_csv")
     summary = read_summary(args.log)
     decoders = Decoders(summary, args.topics)
@@ -123,6 +146,25 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
     for name, rows in files.items():
         tell(f"{out / name}: {rows} rows")
     return {"out": str(out), "files": files, "unreadable": _report_unreadable(decoders, args, sum(files.values()))}
+
+
+def _export_signals(args: argparse.Namespace) -> dict[str, Any]:
+    out: Path = args.out or args.log.with_name(f"{args.log.stem}_signals.{args.to}")
+    if args.topics:
+        raise UsageError("--signals is one topic", do="Leave out --topics")
+    if out.exists():
+        raise UsageError("it exists already", where=str(out), do="Give another one with --out")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            rows = WRITERS[args.to](out, signal_rows(args.log))
+        except BaseException:  # half a table would block the next one
+            out.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise EnvironmentFault(f"the table cannot be written: {error.strerror}", where=str(out)) from None
+    tell(f"{out}: {rows} rows")
+    return {"out": str(out), "rows": rows}
 
 
 @contextmanager

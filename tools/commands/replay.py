@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_io.error_report import printable, say_json, tell
-from robot_io.errors import ReplayDiffers
+from robot_io.errors import ReplayDiffers, UsageError
 from robot_io.log.log_format import FORMAT_FACT
 from tools.places.find_log import find_log
 from tools.replay import what_if_report
@@ -124,7 +124,10 @@ def machine_differences(facts: dict[str, str]) -> list[str]:
 
 
 def answer_what_if(path: Path, args: argparse.Namespace) -> int:
-    """Re-run the log's inputs with other settings and say what would differ."""
+    """Re-run the log's inputs with other settings and say what would differ. Raises UsageError with --tolerance."""
+    if args.tolerance is not None:
+        what = "--tolerance is for comparing with the log, which --what-if does not do"
+        raise UsageError(what, where="push replay", do="Leave one of them out")
     result = what_if(path, args.what_if)
     for line in what_if_report.lines(result):
         (tell if args.json else print)(printable(line))

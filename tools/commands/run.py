@@ -7,11 +7,13 @@ import socket
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
-from tools.commands.run_outputs import save_tare, write_report, write_summary
+from tools.commands.run_outputs import save_tare, unused_faults, with_injected, write_report, write_summary
 from tools.commands.run_trials import check_trials, run_battery
 from tools.live.arguments import add_live_arguments
 from tools.live.view import check_live, live_view
@@ -26,9 +28,10 @@ from tools.run.facts.bounds import bounds_of, check_room
 from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
 from tools.terminal import verdict
-from tools.terminal.arguments import SEED, name_or_path, named_path, note, number, whole_number
+from tools.terminal.arguments import SEED, named_path, note, number, whole_number
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.terminal.rig_arguments import add_faults, add_rig
 from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
@@ -36,9 +39,7 @@ from tools.verdict.witness import Witness
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push run`."""
-    parser.add_argument(
-        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
-    )
+    add_rig(parser)
     parser.add_argument(
         "--distance-m", type=number(0.001, 1000), metavar="M", help="how far to push, from first contact"
     )
@@ -49,15 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
     )
-    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
-    parser.add_argument(
-        "--fault",
-        dest="faults",
-        action="append",
-        default=[],
-        metavar="WORDS",
-        help='inject a fault, at levels sim and emulated: "ft.frozen at 3 s for 1 s"',
-    )
+    add_faults(parser, 'inject a fault, at levels sim and emulated: "ft.frozen at 10 s for 1 s"')
     parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
     parser.add_argument(
         "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
@@ -239,7 +232,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
-    return with_injected(summary, launcher.injected(figures))
+    return with_injected(summary, launcher.injected(figures)) | {"latency": launcher.latencies()}
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
@@ -290,14 +283,4 @@ def lockstep_summary(
         witness=Witness(),
         pushed=object_pose(rig.path, log.object_poses),
     )
-    return with_injected(summary, figures["injected"])
-
-
-def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
-    """Return the summary and, if faults were injected, how many samples each has changed."""
-    return summary | {"injected": counts} if counts else summary
-
-
-def unused_faults(summary: dict[str, Any]) -> list[str]:
-    """Return the faults to inject that changed nothing."""
-    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]
+    return with_injected(summary, figures["injected"]) | {"latency": msgspec.to_builtins(log.latencies)}

@@ -38,12 +38,12 @@ it should. Beyond the rows of the table these are proved:
 
 ## Faults on demand
 
-    push run sim --fast --fault "ft.frozen at 6 s for 1 s"
-    push run emulated --fault "base.pose.turned=20 at 0 s" --fault "arm.off at 8 s"
+    push run sim --fast --fault "ft.frozen at 10 s for 1 s"
+    push run emulated --fault "base.pose.turned=20 at 0 s" --fault "arm.off at 12 s"
 
 `--fault "DEVICE.KIND[=VALUE] at T s [for T s]"` changes what a device gives, or what the base obeys, at the driver's
 edge, before control and gate see it; T counts from the first tick. In a rig file the same words are a list:
-`[faults]`, `inject = ["ft.off at 5 s"]`. It works at the levels sim and emulated, and is refused where any device is
+`[faults]`, `inject = ["ft.off at 10 s"]`. It works at the levels sim and emulated, and is refused where any device is
 real. The log notes each fault, and replays as any other; `summary.json` counts under `injected` how many samples each
 fault has changed. A fault that changed nothing is an error (exit code 2).
 """

@@ -16,7 +16,7 @@ from tools.rig import resolve_rig, with_faults
 from tools.run.lockstep import START_NS, Lockstep
 from tools.run.tick_core import TickCore
 
-SETTINGS = ("control.distance_m=1.0",)
+SETTINGS = ("control.distance_m=1.0", "ft.tare_s=1.0")
 LATER = {Moment.APPROACH: 50, Moment.PUSH: 50, Moment.RETREAT: 40, Moment.END: 0}
 """A fault begins so many ticks after the phase has its full speed, or has begun."""
 PERIOD_NS = 10_000_000

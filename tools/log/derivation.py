@@ -5,11 +5,11 @@ Ticks give the topics people plot, the object's pose gives its frame, the rig gi
 
 from __future__ import annotations
 
+from robot_io.log.log_format import LOG_FORMAT
 from robot_io.log.ros_messages import POSE_STAMPED, planar_pose
 from robot_io.log.world_messages import WorldState
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick
-from tools.kinds import device_names
 from tools.log.scene_topics import scene_messages, slider_frame, slider_pose
 from tools.log.tick_topics import Message, TickTopics
 
@@ -19,11 +19,14 @@ SLIDER_TOPIC = "/slider/pose"
 
 
 class Derivation:
-    """Derives messages from the records of one log, given in the order written; times are log times in ns."""
+    """Derives messages from the records of one log, given in the order written; times are log times in ns.
 
-    def __init__(self, rig: RigConfig, wall_offset_ns: int) -> None:
+    log_format: of that log, so that replay derives what a log of an earlier format held.
+    """
+
+    def __init__(self, rig: RigConfig, wall_offset_ns: int, log_format: int = LOG_FORMAT) -> None:
         self._rig = rig
-        self._topics = TickTopics(wall_offset_ns, device_names(rig))
+        self._topics = TickTopics(rig, wall_offset_ns, log_format)
         # With motion capture the object's pose is measured, otherwise it is the simulated ground truth.
         self.slider_is_tracked = bool(rig.base.topics.slider_pose)
 

@@ -13,6 +13,7 @@ from robot_io.errors import LogDamaged
 from robot_io.geometry import yaw_from_quaternion
 from robot_io.log.chain import TickChain
 from robot_io.log.channels import BY_TOPIC, CHANNELS, Kind
+from robot_io.log.messages import BASE_CLOCK, BaseClock
 from robot_io.log.ros_messages import POSE_STAMPED
 from robot_io.log.seal import LogSeal, config_seal
 from robot_io.log.world_messages import STATE_CDR
@@ -21,9 +22,12 @@ from robot_io.messages import Pose2D
 from robot_io.rig.config import rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.log.derivation import SLIDER_TOPIC, TICK_TOPIC, Derivation
+from tools.log.stamp_ages import Latency, StampAges
 from tools.log.tick_topics import Message
 
 OFFSET_FACT = "wall_offset_ns"
+STAMPED = (Kind.BASE_POSE, Kind.SLIDER_POSE, Kind.BASE_ODOM)
+"""Records that have their sender's stamp."""
 
 
 class RunLog:
@@ -51,6 +55,8 @@ class RunLog:
         self._declared: set[str] = set()
         self._scene_written = False
         self._object: tuple[bytes, bytes] | None = None
+        self._ages = {CHANNELS[kind].topic: StampAges() for kind in STAMPED}
+        self._clock: BaseClock | None = None
         self._seal = LogSeal()
         self.chain = TickChain()
         self.undecodable = 0
@@ -69,6 +75,14 @@ class RunLog:
         first, last = (_planar(payload) for payload in self._object)
         return (first, last) if first and last else None
 
+    @property
+    def latencies(self) -> dict[str, Latency]:
+        """How old the messages of the base and the motion capture were when they arrived, by topic."""
+        clock = self._clock
+        ahead_s, within_s = (None, 0.0) if clock is None else (clock.ahead_s, clock.within_s)
+        found = {topic: ages.latency(ahead_s, within_s) for topic, ages in self._ages.items()}
+        return {topic: latency for topic, latency in found.items() if latency is not None}
+
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
         """Write one ring record and the messages derived from it. Raises OSError when writing to disk fails."""
         if kind == Kind.CONTROL_TICK:
@@ -80,6 +94,10 @@ class RunLog:
         elif kind in CHANNELS:
             log_time_ns = time_ns + self._offset_ns
             self._write(Message(CHANNELS[kind].topic, log_time_ns, payload))
+            if kind in STAMPED:
+                self._ages[CHANNELS[kind].topic].note(payload, log_time_ns)
+            elif kind == Kind.BASE_CLOCK:
+                self._note_clock(payload)
             if kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
                 self._slider(kind, log_time_ns, payload)
         else:
@@ -107,6 +125,7 @@ class RunLog:
             "last_tick_crc32": f"{self.chain.crc32:08x}",
             "undecodable": str(self.undecodable),
             "unknown_kinds": str(self.unknown_kinds),
+            **{f"latency {topic}": latency.in_words() for topic, latency in self.latencies.items()},
         }
         self._log.finish({**own, **facts})
 
@@ -130,6 +149,12 @@ class RunLog:
         self._log.write(message.topic, message.log_time_ns, message.payload)
         if self._also is not None:
             self._also(message.topic, message.log_time_ns, message.payload)
+
+    def _note_clock(self, payload: bytes) -> None:
+        try:
+            self._clock = BASE_CLOCK.decode(payload)
+        except LogDamaged:
+            self.undecodable += 1
 
     def _slider(self, kind: int, log_time_ns: int, payload: bytes) -> None:
         try:

@@ -1,6 +1,7 @@
 """Derive the topics people plot from `/control/tick`, for ROS tools; a pure function of the ticks.
 
-Header stamps and log times are wall time in ns: the tick's CLOCK_MONOTONIC times plus the run's offset.
+Header stamps and log times are wall time in ns: the tick's CLOCK_MONOTONIC times plus the run's offset. A message of
+a standard type is left out where a number in it would not be finite: viewers drop such messages, the tick holds it.
 """
 
 from __future__ import annotations
@@ -9,11 +10,14 @@ import math
 from typing import Any, NamedTuple
 
 from robot_io.clock import NS_PER_S
+from robot_io.geometry import point_outside
 from robot_io.log.channels import BY_TOPIC
-from robot_io.log.messages import LoopTiming, SafetyEvent
+from robot_io.log.log_format import LOG_FORMAT
+from robot_io.log.messages import ArmStatus, LoopTiming, SafetyEvent
 from robot_io.log.ros_messages import (
     BASE_FRAME,
     SENSOR_FRAME,
+    SENSOR_WORLD_FRAME,
     WORLD_FRAME,
     DiagnosticArray,
     DiagnosticStatus,
@@ -32,9 +36,13 @@ from robot_io.log.ros_messages import (
     ros_time,
     yaw_quaternion,
 )
-from robot_io.messages import ArmState, LinkState
+from robot_io.messages import ArmState, BodyTwist, LinkState
+from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, FtReading, Mode
 from safety.faults import FAULTS
+from tools.kinds import device_names
+from tools.log.signals import SignalsOf
+from tools.log.torque import TorqueOf
 
 JOINT_NAMES = (
     "shoulder_pan_joint",
@@ -66,10 +74,13 @@ def message(topic: str, log_time_ns: int, value: Any) -> Message:
 class TickTopics:
     """Derives the other topics from ticks given in order; remembers only the last state reported."""
 
-    def __init__(self, wall_offset_ns: int, names: tuple[str, str, str]) -> None:
-        """names: names of the sensor, the arm and the base."""
+    def __init__(self, rig: RigConfig, wall_offset_ns: int, log_format: int = LOG_FORMAT) -> None:
+        """log_format: of the log whose topics are derived; earlier ones have fewer."""
         self._offset_ns = wall_offset_ns
-        self._names = names
+        self._names = device_names(rig)
+        self._sensor_in_base = rig.frames.sensor_in_base_m
+        self._until_3 = log_format <= 3
+        self._torque, self._signals = TorqueOf(rig), SignalsOf(rig)
         self._faults: tuple[str, ...] = ()
         self._mode = 0
         self._paused = False
@@ -83,11 +94,12 @@ class TickTopics:
         now_ns = inp.now_ns + self._offset_ns
         header = Header(ros_time(now_ns), WORLD_FRAME)
         body = Header(header.stamp, BASE_FRAME)
-        messages = [self._raw_wrench(reading) for reading in inp.ft.readings]
-        force = Vector3(*tick.after.control.force_world)
-        messages.append(message("/ft/wrench", now_ns, WrenchStamped(header, Wrench(force, _NO_TORQUE))))
-        messages.append(message("/base/cmd_vel_raw", now_ns, TwistStamped(body, planar_twist(out.wanted_body))))
-        messages.append(message("/base/cmd_vel", now_ns, TwistStamped(body, planar_twist(out.command_body))))
+        messages = [raw for reading in inp.ft.readings for raw in self._raw_wrench(reading)]
+        messages += self._wrench(tick, now_ns)
+        messages += self._twist("/base/cmd_vel_raw", body, now_ns, out.wanted_body)
+        messages += self._twist("/base/cmd_vel", body, now_ns, out.command_body)
+        if not self._until_3:
+            messages.append(message("/control/signals", now_ns, self._signals.of(tick, header)))
         host = inp.host
         timing = LoopTiming(
             header, inp.tick, inp.now_ns - host.late_ns, host.late_ns, host.skipped, host.skipped > 0, host.log_dropped
@@ -101,21 +113,47 @@ class TickTopics:
             messages.append(message("/diagnostics", now_ns, _diagnostics(tick, header, self._names)))
         return messages
 
-    def _raw_wrench(self, reading: FtReading) -> Message:
+    def _raw_wrench(self, reading: FtReading) -> list[Message]:
         time_ns = reading.received_ns + self._offset_ns
+        if not self._sound(*reading.force, *reading.torque):
+            return []
         wrench = Wrench(Vector3(*reading.force), Vector3(*reading.torque))
-        return message("/ft/wrench_raw", time_ns, WrenchStamped(Header(ros_time(time_ns), SENSOR_FRAME), wrench))
+        return [message("/ft/wrench_raw", time_ns, WrenchStamped(Header(ros_time(time_ns), SENSOR_FRAME), wrench))]
+
+    def _wrench(self, tick: ControlTick, now_ns: int) -> list[Message]:
+        force, torque = tick.after.control.force_world, self._torque.of(tick)
+        frame = WORLD_FRAME if self._until_3 else SENSOR_WORLD_FRAME
+        if not self._sound(*force, *torque):
+            return []
+        wrench = Wrench(Vector3(*force), _NO_TORQUE if self._until_3 else Vector3(*torque))
+        return [message("/ft/wrench", now_ns, WrenchStamped(Header(ros_time(now_ns), frame), wrench))]
+
+    def _twist(self, topic: str, header: Header, now_ns: int, twist: BodyTwist) -> list[Message]:
+        if not self._sound(twist.vx, twist.vy, twist.omega):
+            return []
+        return [message(topic, now_ns, TwistStamped(header, planar_twist(twist)))]
+
+    def _sound(self, *numbers: float) -> bool:
+        """Return whether a standard message may hold these numbers; logs up to format 3 held what there was."""
+        return self._until_3 or all(map(math.isfinite, numbers))
 
     def _arm(self, tick: ControlTick) -> list[Message]:
         arm = tick.input.arm
         if arm.packets == self._arm_packets:
             return []
         self._arm_packets = arm.packets
-        time_ns = arm.changed_ns + self._offset_ns
-        state = JointState(
-            Header(ros_time(time_ns), BASE_FRAME), JOINT_NAMES, arm.joints.position, arm.joints.velocity, ()
-        )
-        return [message("/arm/joint_states", time_ns, state)]
+        joints, time_ns = arm.joints, arm.changed_ns + self._offset_ns
+        header = Header(ros_time(time_ns), BASE_FRAME)
+        messages = []
+        if self._sound(*joints.position, *joints.velocity):
+            state = JointState(header, JOINT_NAMES, joints.position, joints.velocity, ())
+            messages.append(message("/arm/joint_states", time_ns, state))
+        if not self._until_3:
+            status = ArmStatus(
+                header, joints.controller_time_s, joints.device_state, joints.state, arm.link, arm.error, arm.servo
+            )
+            messages.append(message("/arm/status", time_ns, status))
+        return messages
 
     def _base(self, tick: ControlTick) -> list[Message]:
         base = tick.input.base
@@ -123,9 +161,18 @@ class TickTopics:
             return []
         self._pose_seq = base.pose_seq
         time_ns = base.pose_received_ns + self._offset_ns
+        if not self._sound(base.pose.x, base.pose.y, base.pose.yaw):
+            return []
+        header = Header(ros_time(time_ns), WORLD_FRAME)
         pose = Transform(Vector3(base.pose.x, base.pose.y, 0.0), yaw_quaternion(base.pose.yaw))
-        placed = TransformStamped(Header(ros_time(time_ns), WORLD_FRAME), BASE_FRAME, pose)
-        return [message("/tf", time_ns, TFMessage((placed,)))]
+        placed = TransformStamped(header, BASE_FRAME, pose)
+        if self._until_3:
+            return [message("/tf", time_ns, TFMessage((placed,)))]
+        ahead, left, up = self._sensor_in_base
+        x, y = point_outside(base.pose.x, base.pose.y, base.pose.yaw, ahead, left)
+        sensor = Transform(Vector3(x, y, up), yaw_quaternion(0.0))
+        aligned = TransformStamped(header, SENSOR_WORLD_FRAME, sensor)
+        return [message("/tf", time_ns, TFMessage((placed, aligned)))]
 
     def _events(self, tick: ControlTick, header: Header, now_ns: int) -> list[Message]:
         before = tick.before[0].safety.mode if tick.before else self._mode

@@ -1,7 +1,8 @@
 """Check that the base data in ticks matches the gate's log: what it received, and what it actually sent.
 
 A tick holds only the newest message of each topic, so an additional message in the log proves nothing; but a message
-that a tick holds and the log lacks, or holds with different content, was lost or edited.
+that a tick holds and the log lacks, or holds with different content, was lost or edited. A tick does not hold the pose
+and the covariances of odometry, nor why a pose is flawed: these are not compared.
 """
 
 from __future__ import annotations
@@ -18,7 +19,14 @@ from robot_io.tick import ControlTick
 from tools.replay.difference import Difference
 from tools.replay.payloads import is_current_type, payload_difference, payloads_equal
 
-TOPICS = ("/base/pose", "/base/odom", "/base/status", "/gate/sent")
+TOPICS = ("/base/pose", "/base/odom", "/base/status", "/base/flawed", "/gate/sent")
+_FROM_FORMAT = {"/base/flawed": 4}
+"""Logs of earlier formats have no such topic: a pose or odometry that was flawed was on the topic of the others."""
+_NOT_HELD = {
+    "/base/odom": frozenset(("header.frame_id", "child_frame_id", "pose", "twist.covariance")),
+    "/base/flawed": frozenset(("flaw", "pose.x", "pose.y", "pose.yaw")),
+}
+_EVERYTHING_HELD = frozenset[str]()
 FIRST_FORMAT = 2
 """Logs before it held the base's messages in another way."""
 MOST_KEPT = 4096
@@ -46,8 +54,11 @@ class _Topic:
 class BaseInputsReplayer:
     """Compares the ticks of a log with its messages of `TOPICS`; a tick and its messages must be near each other."""
 
-    def __init__(self, wall_offset_ns: int, channels: Iterable[ChannelInfo], tolerance: float | None) -> None:
+    def __init__(
+        self, wall_offset_ns: int, channels: Iterable[ChannelInfo], log_format: int, tolerance: float | None
+    ) -> None:
         other = {channel.topic for channel in channels if not is_current_type(channel)}
+        other |= {topic for topic, first_format in _FROM_FORMAT.items() if log_format < first_format}
         self._topics = {topic: _Topic() for topic in TOPICS if topic not in other}
         self._tolerance = tolerance
         self._offset_ns = wall_offset_ns
@@ -61,10 +72,11 @@ class BaseInputsReplayer:
         base = tick.input.base
         held, self._held = self._held, (base.pose_seq, base.odometry_seq, base.status_received_ns, base.sent_ns)
         try:
-            if base.pose_seq != held[0] and base.pose_valid:
-                self._received(base.pose_received_ns, BasePose(base.pose))
+            if base.pose_seq != held[0]:
+                pose = BasePose(base.pose, "" if base.pose_valid else "flawed")
+                self._received(base.pose_received_ns, pose, base.pose_stamp_ns)
             if base.odometry_seq != held[1]:
-                self._received(base.odometry_received_ns, BaseOdometry(base.odometry))
+                self._received(base.odometry_received_ns, BaseOdometry(base.odometry), base.odometry_stamp_ns)
             if base.status_received_ns != held[2]:
                 self._received(base.status_received_ns, BaseReport(base.status))
             if base.sent_ns != held[3]:
@@ -85,7 +97,7 @@ class BaseInputsReplayer:
             state.forgotten_ns = max(state.forgotten_ns, oldest)
         waiting = state.wanted.get(log_time_ns, [])
         for i, held in enumerate(waiting):
-            if payloads_equal(topic, payload, held, self._tolerance):
+            if self._equal(topic, payload, held):
                 del waiting[i]
                 if not waiting:
                     del state.wanted[log_time_ns]
@@ -101,20 +113,27 @@ class BaseInputsReplayer:
                     lost += len(waiting)
                     if first is None or log_time_ns < first.tick:
                         logged = state.seen.get(log_time_ns, [None])[0]
-                        first = payload_difference(log_time_ns, topic, logged, waiting[0])
+                        first = payload_difference(log_time_ns, topic, logged, waiting[0], _not_held(topic))
         return BaseInputsReplay(self._identical + lost, self._identical, first)
 
-    def _received(self, received_ns: int, value: BaseFeed) -> None:
-        self._gate.inbound(Stamped(value, 0, received_ns))
+    def _received(self, received_ns: int, value: BaseFeed, stamp_ns: int = 0) -> None:
+        self._gate.inbound(Stamped(value, 0, received_ns, stamp_ns=stamp_ns))
+
+    def _equal(self, topic: str, one: bytes, other: bytes) -> bool:
+        return payloads_equal(topic, one, other, self._tolerance, _not_held(topic))
 
     def _expect(self, kind: int, time_ns: int, payload: bytes) -> None:
         topic, log_time_ns = CHANNELS[kind].topic, time_ns + self._offset_ns
         state = self._topics.get(topic)
         if state is None:
             return
-        if any(payloads_equal(topic, logged, payload, self._tolerance) for logged in state.seen.get(log_time_ns, ())):
+        if any(self._equal(topic, logged, payload) for logged in state.seen.get(log_time_ns, ())):
             self._identical += 1
         elif log_time_ns > state.forgotten_ns:
             state.wanted.setdefault(log_time_ns, []).append(payload)
             if len(state.wanted) > MOST_KEPT:
                 del state.wanted[next(iter(state.wanted))]
+
+
+def _not_held(topic: str) -> frozenset[str]:
+    return _NOT_HELD.get(topic, _EVERYTHING_HELD)

@@ -13,7 +13,7 @@ import msgspec
 
 from robot_io.errors import LogDamaged
 from robot_io.log import log_format
-from robot_io.log.channels import DERIVED
+from robot_io.log.channels import BY_TOPIC, DERIVED
 from robot_io.log.messages import GATE_SAYS, INJECTED, SAFETY_EVENT
 from robot_io.log.world_messages import WorldState
 from robot_io.mcap.read import ChannelInfo
@@ -22,7 +22,7 @@ from robot_io.tick import ControlTick
 from tools.log.derivation import SLIDER_TOPIC, TICK_TOPIC, WORLD_TOPIC, Derivation
 from tools.log.tick_topics import Message
 from tools.replay.difference import Difference
-from tools.replay.payloads import is_current_type, payload_difference, payloads_equal
+from tools.replay.payloads import earlier_types, is_current_type, payload_difference, payloads_equal
 
 SCENE = ("/robot_description", "/tf_static", "/path")
 EVENTS, ROSOUT = "/safety/event", "/rosout"
@@ -60,12 +60,13 @@ class DerivedReplayer:
         log_format_number: int,
         tolerance: float | None = None,
     ) -> None:
-        self._derive = Derivation(rig, wall_offset_ns)
+        self._derive = Derivation(rig, wall_offset_ns, log_format_number)
         self._tolerance = tolerance
         compared = {channel.topic for channel in DERIVED} | {EVENTS, ROSOUT}
         if not self._derive.slider_is_tracked:
             compared.add(SLIDER_TOPIC)
-        other = {channel.topic for channel in channels if not is_current_type(channel)}
+        self._earlier = earlier_types(channels, log_format_number)
+        other = {c.topic for c in channels if not is_current_type(c) and c.topic not in self._earlier}
         other |= {topic for topic, last_format in log_format.CHANGED_TOPICS if log_format_number <= last_format}
         self._not_compared, self._compared = compared & other, compared - other
         self._waiting: dict[Key, list[Waiting]] = {}
@@ -86,7 +87,11 @@ class DerivedReplayer:
         """Take a message of any other topic."""
         if topic == SLIDER_TOPIC and self._derive.slider_is_tracked:
             self._expect(SLIDER_TOPIC, log_time_ns, lambda: self._derive.slider(payload, log_time_ns))
-        if topic not in self._compared or (topic == EVENTS and _is_input(payload)):
+        if topic not in self._compared:
+            return
+        if topic in self._earlier:
+            payload = self._today(topic, payload)
+        if topic == EVENTS and _is_input(payload):
             return
         if topic in SCENE and not self._scene_derived:
             self._scene_derived = True  # derived from the first record's time, which only these messages hold
@@ -119,6 +124,13 @@ class DerivedReplayer:
         self._newest[source] = derived
         for topic, message_time_ns, payload in derived:
             self._take((message_time_ns, topic), payload, derived=True)
+
+    def _today(self, topic: str, payload: bytes) -> bytes:
+        """Return a message of an earlier type as today's; as it is where it is none of that type."""
+        try:
+            return BY_TOPIC[topic].cdr_type.encode(self._earlier[topic].decode(payload))
+        except (LogDamaged, ValueError):
+            return payload
 
     def _take(self, key: Key, payload: bytes, *, derived: bool) -> None:
         """Match a message with its counterpart, or let it wait."""

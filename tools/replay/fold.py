@@ -68,7 +68,9 @@ def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
     derived = DerivedReplayer(rig, log.wall_offset_ns, log.channels, log.made_by.format, tolerance)
     known = log.made_by.format >= FIRST_FORMAT and log.ticks.holds_all_of("input.base")
     comparable = known and not log.dropped("gate")
-    arrived = BaseInputsReplayer(log.wall_offset_ns, log.channels, tolerance) if comparable else None
+    arrived = (
+        BaseInputsReplayer(log.wall_offset_ns, log.channels, log.made_by.format, tolerance) if comparable else None
+    )
     for topic, log_time_ns, payload, tick in log.messages():
         if tick is not None:
             ticks.take(tick, payload)

@@ -142,8 +142,12 @@ class Launcher:
 
     def pushed(self) -> ObjectPose | None:
         """Return where the object is, once `run` has returned; None if that is not known."""
-        poses = self._finished_event("recorder").get("object_poses")
-        return object_pose(self._rig.path, msgspec.convert(poses, tuple[Pose2D, Pose2D] | None))
+        poses = msgspec.convert(self._finished_event("recorder").get("object_poses"), tuple[Pose2D, Pose2D] | None)
+        return object_pose(self._rig.path, poses)
+
+    def latencies(self) -> dict[str, Any]:
+        """Return how old messages were when they arrived, by topic, once `run` has returned."""
+        return dict(self._finished_event("recorder").get("latencies", {}))
 
     def injected(self, figures: dict[str, Any]) -> dict[str, int]:
         """Return how many samples each injected fault changed, by its words; none for a process that did not say."""
@@ -151,8 +155,6 @@ class Launcher:
         by_control: dict[str, int] = figures.get("injected", {})
         words = {parse_fault(word).text for word in self._rig.faults.inject}
         return by_control | {word: n for word, n in by_gate.items() if word in words}
-
-    # --- start -----------------------------------------------------------------------------------------------
 
     def _start(self) -> None:
         self._wait_ready(self._processes.start_emulators(), EMULATORS_READY_NS)

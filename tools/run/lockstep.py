@@ -14,7 +14,7 @@ from msgspec.structs import astuple, replace
 
 from control.loop import ft_input
 from control.notes.run_notes import RunNotes, outcome
-from robot_io.clock import NS_PER_S, SIM_EPOCH_NS, ClockNs, VirtualClock
+from robot_io.clock import NS_PER_S, SIM_START_NS, SIM_WALL_OFFSET_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
 from robot_io.messages import ArmRecord
@@ -43,8 +43,7 @@ from tools.run.facts.run_facts import run_facts
 from tools.run.run_state import initial_state
 from tools.run.tick_core import TickCore
 
-START_NS = NS_PER_S
-"""Virtual time of the first tick."""
+START_NS = SIM_START_NS
 MAX_SIMULATED_S = 4 * 3600.0
 
 
@@ -83,7 +82,7 @@ class Lockstep:
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig, seed), pose_source=rig.base.pose_source
         )
-        self._note_injected = event_writer(push, SIM_EPOCH_NS - START_NS)
+        self._note_injected = event_writer(push, SIM_WALL_OFFSET_NS)
         self.first_injected_ns: int | None = None
         self.injection = Injection(rig.faults.inject, self._clock, self._on_injected)
         self.injection.begin(START_NS)
@@ -94,7 +93,7 @@ class Lockstep:
         self._state = initial_state(saved)
         self._recorded = False
         self._gate = GateShell(self._core.safety.envelope, total_bounds(rig), START_NS)
-        self._gate_log = GateLog(push, SIM_EPOCH_NS - START_NS)
+        self._gate_log = GateLog(push, SIM_WALL_OFFSET_NS)
         self.notes = RunNotes()
         self.operator = Operator.NONE
         self.paused = False
@@ -103,8 +102,9 @@ class Lockstep:
         """Run to the end and return the figures; `on_tick` is called after each tick (to pace and to display)."""
         devices = (self._ft, self._arm, self._base)
         for device in devices:
-            device.open()
+            info = device.open()
             device.start()
+        self._gate_log.clock(START_NS, info.clock)  # the base is the last
         tick = 0
         while True:
             now_ns = START_NS + tick * self._period_ns
@@ -210,7 +210,7 @@ def open_log(
     """Open the log of a lockstep run; its facts hold nothing that differs from run to run. to_view: a live view's."""
     facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact, note=note)
     also = LiveFeed(to_view).add if to_view is not None else None
-    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_EPOCH_NS - START_NS, also=also)
+    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_WALL_OFFSET_NS, also=also)
 
 
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:

@@ -177,6 +177,7 @@ class Recorder:
             undecodable=self._log.undecodable,
             object_poses=self._log.object_poses,
             live=self._live.counts() if self._live is not None else None,
+            latencies=self._log.latencies,
         )
 
 

@@ -183,7 +183,7 @@ STANDARD = [
             HEADER,
             "base_link",
             ros.PoseWithCovariance(POSE, tuple(float(i) for i in range(36))),
-            ros.TwistWithCovariance(TWIST, ros.UNKNOWN_COVARIANCE),
+            ros.TwistWithCovariance(TWIST, (0.0,) * 36),
         ),
     ),
     (ros.PATH, ros.Path(HEADER, (ros.PoseStamped(HEADER, POSE),) * 3)),

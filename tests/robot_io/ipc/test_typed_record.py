@@ -47,6 +47,8 @@ BASE = BaseRecord(
     object_pose=Pose2D(2.25, -1.5, 0.75),
     object_received_ns=115,
     lag_ns=116,
+    pose_stamp_ns=117,
+    odometry_stamp_ns=118,
 )
 ARM = ArmRecord(
     joints=JointState(

@@ -94,3 +94,32 @@ def test_what_was_not_asked_for_is_counted():
     reader = FeedReader(TOPICS, "mocap", Pose2D())
     assert reader.read(Published("/elsewhere", b"{}"), 0) == []
     assert reader.counters["unasked"] == 1
+
+
+def test_what_odometry_says_of_its_pose_comes_along_in_its_own_frame_and_its_stamp_to_the_ns():
+    message = json.loads(odometry(3.0, 4.0, 0.0).msg)
+    message["header"]["stamp"] = {"secs": 1_700_000_000, "nsecs": 123_456_789}
+    message["pose"]["covariance"] = [n / 8 for n in range(36)]
+    message["twist"]["covariance"] = [None, *[0.5] * 35]
+    [sample] = FeedReader(TOPICS, "mocap", Pose2D()).read(Published("/odom", json.dumps(message).encode()), 0)
+    came = sample.value.pose
+    assert (came.frame, came.child_frame, came.position) == ("odom", "base_link", (3.0, 4.0, 0.0))
+    assert came.orientation == (0.0, 0.0, 0.0, 1.0)
+    assert came.covariance == tuple(n / 8 for n in range(36))
+    assert came.twist_covariance == (0.0,) * 36, "one with a null says nothing"
+    assert sample.stamp_ns == sample.epoch_ns == 1_700_000_000_123_456_789
+
+
+def test_odometry_with_a_null_in_its_pose_has_none_and_keeps_its_velocity():
+    [sample] = FeedReader(TOPICS, "mocap", Pose2D()).read(odometry(None, 4.0, 0.0), 0)
+    assert sample.value.pose is None
+    assert sample.value.twist.vx == 0.0
+
+
+@pytest.mark.parametrize("secs", [0, 5, 946_684_799, 2**31, 2**32 - 1])
+def test_a_stamp_of_no_wall_clock_is_kept_but_is_no_time_of_day(secs):
+    message = json.loads(odometry(1.0, 4.0, 0.0).msg)
+    message["header"]["stamp"] = {"secs": secs, "nsecs": 7}
+    [sample] = FeedReader(TOPICS, "mocap", Pose2D()).read(Published("/odom", json.dumps(message).encode()), 0)
+    assert sample.stamp_ns == secs * 10**9 + 7
+    assert sample.epoch_ns == 0

@@ -72,6 +72,26 @@ def test_resolved_rig_reads_back_equal(name):
     assert rig_from_toml(rig_to_toml(rig)) == rig
 
 
+def test_a_rig_with_lists_of_tables_and_times_reads_back_equal():
+    forces = ("[-10, 0.1, 0]", "[1, 2, 3]")
+    hand = ", ".join(f"{{at_s = 1, for_s = 0.5, force_body_N = {force}}}" for force in forces)
+    made = ["calibration.path.made=2026-07-01T12:00:00.25+02:00", "calibration.path.uncertainty=[0.005, 0.2]"]
+    rig = load_rig("sim", [f"world.hand=[{hand}]", *made, 'calibration.path.unit="m, deg"'])
+    assert [press.force_body_N for press in rig.world.hand] == [(-10.0, 0.1, 0.0), (1.0, 2.0, 3.0)]
+    assert rig_from_toml(rig_to_toml(rig)) == rig
+
+
+def test_mistakes_in_a_list_of_tables_have_its_first_line(tmp_path):
+    path = write(tmp_path / "r.toml", 'extends = "sim"\n[world.sensor]\nphase = 0.1\n[[world.hand]]\nat_s = 1.0\n')
+    with pytest.raises(ConfigError, match="required field `for_s`") as caught:
+        load_rig(path)
+    assert caught.value.where == f"{path}:4"
+    write(path, 'extends = "sim"\n[[world.hand]]\nat_s = 1\nfor_s = 1\nforce_body_N = [nan, 0, 0]\n')
+    with pytest.raises(ConfigError, match="not finite") as caught:
+        load_rig(path)
+    assert caught.value.where == f"{path}:2"
+
+
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
 

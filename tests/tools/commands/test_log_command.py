@@ -16,6 +16,7 @@ from robot_io.cdr.cdr_type import CdrType
 from robot_io.log import ros_messages as ros
 from robot_io.mcap.log_file import McapLog
 from robot_io.messages import Pose2D
+from tests.push_runs import QUICK, finished
 from tools.cli import main
 
 START_NS = 1_600_000_000_000_000_000
@@ -119,7 +120,7 @@ def test_export_writes_a_table_per_topic_with_units(log, tmp_path, capsys):
 
 def test_a_format_is_not_read_as_a_topic(log, tmp_path, capsys):
     assert main(["log", "export", str(log), "--to", "parquet"]) == 2
-    assert "unrecognized arguments: --to parquet" in capsys.readouterr().err
+    assert "--signals" in capsys.readouterr().err
     assert not (tmp_path / "run_csv").exists()
 
 
@@ -229,3 +230,76 @@ def test_a_reader_that_goes_away_is_no_traceback(log):
     assert b"Traceback" not in process.stderr.read()
     process.stderr.close()
     process.wait(20)
+
+
+def push_log(folder: Path) -> Path:
+    done = finished(
+        folder / "state", "run", "sim", "--fast", *QUICK, "--distance-m", "0.1", "--out", str(folder / "run")
+    )
+    assert done.code == 0, done.err
+    return folder / "run"
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_signals_are_one_tidy_table_with_names(tmp_path, capsys):
+    run = push_log(tmp_path)
+    assert main(["log", "export", str(run), "--signals", "--json"]) == 0
+    told = last_json(capsys)
+    assert told["out"] == str(run / "run_signals.csv")
+    rows = read_table(run / "run_signals.csv")
+    assert told["rows"] == len(rows) > 250
+    assert list(rows[0])[:3] == ["time_s", "log_time_ns", "progress_m"]
+    assert list(rows[0])[-4:] == ["phase", "mode", "contact", "fault"]
+    assert [float(row["time_s"]) for row in rows[:3]] == [0.0, 0.01, 0.02]
+    phases = list(dict.fromkeys(row["phase"] for row in rows))
+    assert phases[:4] == ["settle", "tare", "approach", "push"]
+    assert {row["contact"] for row in rows if row["phase"] == "push"} == {"touching"}
+    assert {row["mode"] for row in rows if row["phase"] == "push"} == {"pushing"}
+    assert rows[0]["theta_f_rad"] == "", "not known yet"
+    assert "nan" not in (run / "run_signals.csv").read_text()
+    assert main(["log", "export", str(run), "--signals"]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["sim", "sim-format-2", "sim-format-3"])
+def test_the_signals_of_an_earlier_format_are_derived_from_its_ticks(name, tmp_path, capsys):
+    log = Path(__file__).resolve().parents[2] / "golden" / "logs" / f"{name}.mcap"
+    assert main(["log", "export", str(log), "--signals", "--out", str(tmp_path / "s.csv"), "--json"]) == 0
+    rows = read_table(tmp_path / "s.csv")
+    assert 0.09 < max(float(row["speed_sent"]) for row in rows) <= 0.1 + 1e-6, "all push at 0.1 m/s"
+    assert rows[-1]["phase"] == "done"
+
+
+def test_the_signals_as_parquet(tmp_path, capsys):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="the extra `parquet` is not installed")
+    run = push_log(tmp_path)
+    for form in ("csv", "parquet"):
+        assert main(["log", "export", str(run), "--signals", "--to", form]) == 0
+    table = parquet.read_table(run / "run_signals.parquet").to_pylist()
+    rows = read_table(run / "run_signals.csv")
+    assert [row["phase"] for row in table] == [row["phase"] for row in rows]
+    for got, row in zip(table, rows, strict=True):
+        assert got["lateral_m"] == pytest.approx(float(row["lateral_m"]), rel=1e-6)
+
+
+def test_parquet_without_its_package_says_how_to_get_it_and_leaves_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    log = Path(__file__).resolve().parents[2] / "golden" / "logs" / "sim-format-3.mcap"
+    assert main(["log", "export", str(log), "--signals", "--to", "parquet", "--out", str(tmp_path / "s")]) == 3
+    assert "[parquet]" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("more", "word"), [
+    (["--to", "parquet"], "--signals"), (["--to", "xlsx"], "xlsx"), (["--signals", "--topics", "/pose"], "--topics"),
+    (["--signals"], "not the log of a push"),
+])  # fmt: skip
+def test_an_export_that_cannot_be_is_one_sentence(log, capsys, more, word):
+    assert main(["log", "export", str(log), *more]) == 2
+    told = capsys.readouterr().err
+    assert word in told
+    assert {path.name for path in log.parent.iterdir()} == {"run.mcap"}

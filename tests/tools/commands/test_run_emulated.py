@@ -29,7 +29,7 @@ FILES = {"run.mcap", "config.toml", "summary.json", "processes.json"}
 
 @pytest.fixture(scope="module")
 def shared_run(state, host, tmp_path_factory):
-    """The run that the first tests look at, with all its defaults but the distance; and its folder.
+    """The run that the first tests look at, with all its defaults but the distance and the tare; and its folder.
 
     It is started in a folder with packages that are called like ours, as in many a project.
     """

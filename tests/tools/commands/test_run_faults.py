@@ -13,7 +13,7 @@ from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import QUICK, SAFETY_STOP, blame_the_host, finished
 from tests.replay.runs import push
 
-SIM = ("run", "sim", "--fast", "--no-report", "--distance-m", "0.5", "--json")
+SIM = ("run", "sim", "--fast", "--no-report", "--distance-m", "0.5", "--json", "--set", "ft.tare_s=1")
 FROZEN = "ft.frozen at 5 s for 1 s"
 
 

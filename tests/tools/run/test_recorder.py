@@ -184,6 +184,8 @@ def test_what_was_pushed_is_in_the_log_with_what_is_derived_from_it(run):
         "/base/cmd_vel": 120,
         "/loop/timing": 120,
         "/arm/joint_states": 120,
+        "/arm/status": 120,
+        "/control/signals": 120,
         "/tf": 120,
         "/diagnostics": 2,
         "/safety/event": 1 + 2 * 3,  # one mode, three faults that come and go

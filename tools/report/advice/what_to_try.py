@@ -74,8 +74,9 @@ def _of_the_line(run: RunData, missed: bool) -> list[str]:
 def _next_step(run: RunData, angle: ForceAngle, per_newton_m: float) -> str:
     seen, start, tare = (math.degrees(a) for a in (angle.seen_rad, angle.transient_rad, angle.tare_rad))
     found = (
-        f"Over the last {angle.over_m:.1f} m the force pointed {seen:+.1f} degrees aside; what is left of the start "
-        f"explains at most {start:.1f}, the tare {tare:.1f}"
+        f"Over the last {angle.over_m:.1f} m the force pointed {seen:+.1f} degrees aside, and the offset at the end "
+        f"stands for {math.degrees(angle.offset_rad):+.1f}; what is left of the start explains at most {start:.1f}, "
+        f"the tare {tare:.1f}"
     )
     if angle.points_at_the_frame:
         return f"{found}: the sensor's mounting is off, and `{FRAME}` measures it."
