@@ -31,7 +31,21 @@ FAULT_IDS: tuple[str, ...] = (
     *("F33", "F33-way", "F34", "F35", "F36", "F37", "F38", "F38-late", "F39", "F40-slow", "F40-stop", "F41", "F42"),
     *("F43", "F44", "F45-approach", "F45-push", "F45-retreat", "F46-approach", "F46-push", "F46-retreat"),
     *("F47", "F48", "F49", "F50-slow", "F50-stop", "F51", "F52", "F52-hold", "F52-refused", "F53", "F53-early"),
-    *("F54-stop", "F54-hold", "F55-slow", "F55-stop", "F56", "F58", "F59", "F60-late", "F60-slow", "F61", "F63"),
+    *(
+        "F54-stop",
+        "F54-hold",
+        "F55-slow",
+        "F55-stop",
+        "F56",
+        "F57",
+        "F57-slow",
+        "F58",
+        "F59",
+        "F60-late",
+        "F60-slow",
+        "F61",
+        "F63",
+    ),
     *("F64", "F65", "F66", "F67", "F67-late", "F68", "F69", "F73-hold", "F73-stop"),
 )
 """Rows of the fault table that have a name in the definition."""
