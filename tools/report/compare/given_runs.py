@@ -7,7 +7,6 @@ from pathlib import Path
 
 from robot_io.errors import UsageError
 from tools.places.find_log import find_log
-from tools.places.trials_folder import TRIALS, trial_folders
 from tools.report.compare.labels import labels
 from tools.report.page import read_summary_file, run_mark
 from tools.report.run_data import RunData, read_run
@@ -15,6 +14,7 @@ from tools.report.run_facts import note_of
 from tools.report.run_verdict import Verdict, verdict
 
 MOST_RUNS = 100
+TRIALS = "trial-*"
 
 
 class ComparedRun:
@@ -76,12 +76,11 @@ def path_notes(runs: Sequence[ComparedRun]) -> list[str]:
 
 
 def _trials(folder: Path) -> list[Path]:
-    """Return the logs of a battery of trials; empty for any other path, also for one that cannot be read."""
+    """Return the logs of a folder of trials; empty for anything else, also for what cannot be read."""
     try:
-        battery = (folder / TRIALS).exists()
+        return [] if (folder / "run.mcap").exists() else sorted(folder.glob(f"{TRIALS}/run.mcap"))
     except OSError:
         return []
-    return [trial / "run.mcap" for trial in trial_folders(folder)] if battery else []
 
 
 def _mark(run: RunData) -> str:
