@@ -123,7 +123,7 @@ COMMANDS = {
 ACTIONS = {
     "log info": ("push log info runs/demo", "push log info runs/demo --json"),
     "log cat": ("push log cat runs/demo --topics /safety/event", "push log cat runs/demo | head -3"),
-    "log export": ("push log export runs/demo", "push log export runs/demo --topics /ft/wrench --out tables"),
+    "log export": ("push log export runs/demo", "push log export runs/demo --signals"),
     "log recover": ("push log recover runs/demo", "push log recover runs/demo --out whole.mcap"),
     "log zip": ("push log zip runs/demo", "push log zip runs --out artifact.zip"),
     "calibrate bias": ("push calibrate bias --rehearse", "push calibrate bias my-rig.toml --seconds 120 --json"),

@@ -13,8 +13,10 @@ from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
+from tools.commands.run_laws import add_law_arguments, check_law, law_overrides, note_passed_law
 from tools.commands.run_outputs import save_tare, unused_faults, with_injected, write_report, write_summary
 from tools.commands.run_trials import check_trials, run_battery
+from tools.laws import own_law
 from tools.live.arguments import add_live_arguments
 from tools.live.view import check_live, live_view
 from tools.places import run_dir, saved_tare
@@ -43,9 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--distance-m", type=number(0.001, 1000), metavar="M", help="how far to push, from first contact"
     )
-    parser.add_argument(
-        "--controller", choices=("force", "open-loop"), help="force (the pushing law) or open-loop (straight ahead)"
-    )
+    add_law_arguments(parser)
     parser.add_argument("--seed", type=SEED, metavar="SEED", default=0, help="seed of the simulated world (0)")
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
@@ -154,8 +154,7 @@ def overrides(args: argparse.Namespace) -> list[str]:
     found = list(args.overrides)
     if args.distance_m is not None:
         found.append(f"control.distance_m={args.distance_m!r}")
-    if args.controller is not None:
-        found.append(f"control.controller={args.controller}")
+    found += law_overrides(args)
     if args.start_in_contact:
         found.append("world.start.gap_m=0.0")
     return found
@@ -170,6 +169,8 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
             where="push run",
             do="Clear the floor, hold the e-stop, and add --move-robot",
         )
+    if hardware and args.move_robot and not args.untested_law:
+        check_law(rig)
     blind = blind_words(rig)
     if blind and not (args.drive_blind or args.check):
         raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
@@ -232,6 +233,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
+    note_passed_law(rig, summary)
     return with_injected(summary, launcher.injected(figures)) | {"latency": launcher.latencies()}
 
 
@@ -248,10 +250,11 @@ def lockstep_summary(
     from tools.run.lockstep import Lockstep, open_log
     from tools.run.paced import PacedRun, run_fast
 
+    law = own_law(rig.control, folder_of(args.rig))
     text = run_dir.write_config(out, rig)
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
     try:
-        one = Lockstep(rig, args.seed, log, saved=saved)
+        one = Lockstep(rig, args.seed, log, saved=saved, law=law)
     except PushError:  # an impossible world: nothing has started
         log.abandon()
         run_dir.discard(out)

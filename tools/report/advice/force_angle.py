@@ -53,7 +53,7 @@ def force_angle(run: RunData) -> ForceAngle | None:
     along, angle = run.ticks["along_m"][pushing], run.ticks["theta_f"][pushing]
     known = np.isfinite(along)
     along, angle = along[known], angle[known]
-    if control.controller != "force" or not control.k_y_rad_per_m or len(along) < 2 or run.last is None:
+    if control.law != "force" or not control.k_y_rad_per_m or len(along) < 2 or run.last is None:
         return None
     pushed_m = float(along[-1] - along[0])
     if pushed_m < SHORTEST_M:

@@ -42,9 +42,9 @@ def what_to_try(run: RunData, verdict: Verdict) -> list[str]:
     against = [item.id for item in verdict.trust if item.says == "against"]
     if not verdict.first_fault:
         lines += [BY_EVIDENCE[name] for name in against if name in BY_EVIDENCE]
-    lost = not verdict.good and run.rig.control.controller == "open-loop"
+    lost = not verdict.good and run.rig.control.law == "open-loop"
     if lost:
-        lines.append("This run steered without force feedback: `--controller force` is the law of the paper.")
+        lines.append("This run steered without force feedback: `--law force` is the law of the paper.")
     missed = set(LINE) & set(against)
     if not verdict.first_fault and not lost:
         lines += _of_the_line(run, bool(missed))
