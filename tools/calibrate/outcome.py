@@ -41,7 +41,7 @@ def saved(found: Estimate, rig: RigConfig, raw: Raw | None, out: Path | None, ap
     uncertainty, residual = (tuple(map(_rounded, values)) for values in (found.uncertainty, found.residual))
     calibration = Calibration(made, _one_or_all(uncertainty), found.unit, _one_or_all(residual), found.source, rig.name)
     path = out or default_path(found.what, made)
-    keys = found.keys | (still_hidden(found, rig) if devices_at(rig, "emulated") else {})
+    keys = found.keys | ({} if devices_at(rig, "hardware") else still_hidden(found, rig))
     write_fragment(path, Fragment(found.what, keys, calibration, found.told))
     readings = _write_readings(path.with_suffix(".csv"), raw) if raw is not None and not raw.empty else None
     return Saved(path, readings, apply_fragment(apply, path) if apply is not None else None)
@@ -84,7 +84,7 @@ def as_json(found: Estimate, written: Saved, logs: Sequence[Path]) -> dict[str, 
         "unit": found.unit,
         "residual": _one_or_all(tuple(map(_rounded, found.residual))),
         "file": str(written.fragment),
-        "log": [str(log) for log in logs] or str(written.readings),
+        "log": [str(log) for log in logs] or (None if written.readings is None else str(written.readings)),
     }
 
 
