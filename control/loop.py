@@ -34,6 +34,7 @@ from robot_io.tick import (
     TickInput,
     TickOutput,
     TickState,
+    link_number,
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
@@ -97,6 +98,7 @@ class ControlLoop:
         watch: Watch,
         operator_fd: int,
         on_status: Callable[[TickInput, TickState, TickOutput], None],
+        law_ns: Callable[[], int] = lambda: 0,
         clock: ClockNs = monotonic_ns,
         asleep: Callable[[], int | None] = asleep_ns,
     ) -> None:
@@ -105,25 +107,18 @@ class ControlLoop:
         self._period_ns = round(1e9 / rate_hz)
         self._status_every = max(1, round(rate_hz / 5.0))
         self._sensor, self._arm, self._base, self._ring, self._watch = sensor, arm, base, ring, watch
-        self._operator_fd = operator_fd
-        self._on_status = on_status
-        self._clock = clock
-        self._read_asleep_ns = asleep
-        self._asleep_ns = 0
+        self._operator_fd, self._on_status = operator_fd, on_status
+        self._law_ns, self._clock, self._read_asleep_ns = law_ns, clock, asleep
         self._loop = EventLoop()
         self._timer: Timer | None = None
-        self._tick = -1
+        self._tick = self._sensor_fd = -1
         self._most_readings = round(FLOOD_S * sensor_rate_hz)
         self._health = sensor.health()
-        self._sensor_fd = -1
         self._sensor_error: Exception | None = None
-        self._taken = 0
         self._readings: list[Stamped[SensorWrench]] = []
-        self._operator = Operator.NONE
-        self._paused = False
+        self._operator, self._paused = Operator.NONE, False
         self._launcher, self._recorder = Silence(), Silence()
-        self._consumed = 0
-        self._last_tick_ns = 0
+        self._consumed = self._taken = self._last_tick_ns = self._asleep_ns = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
@@ -278,6 +273,7 @@ class ControlLoop:
                 self._recorder.so_far_ns(now_ns),
                 self._asleep_ns,
                 self._last_tick_ns,
+                self._law_ns(),
             ),
             ft_input(readings, self._health, self._taken),
             self._arm_record,
@@ -296,7 +292,7 @@ def ft_input(
             FtReading(s.received_ns, s.seq, (s.value.fx, s.value.fy, s.value.fz), (s.value.mx, s.value.my, s.value.mz))
             for s in readings
         ),
-        int(health.state),
+        link_number(health.state),
         counters.get("packets_ok", taken),
         counters.get("crc_fail", 0),
         counters.get("junk_bytes", 0),

@@ -6,10 +6,11 @@ import math
 
 from msgspec.structs import replace
 
-from control import contact_threshold, open_loop, push_law
+from control import contact_threshold, push_law
 from control.sensing import counted, in_contact
 from control.settings import Settings
 from control.speed_profile import approach_speed, push_speed
+from control.steering import steer
 from control.tare import Judgement, judge, refusal_in_contact
 from control.wrench import force_on_slider_world
 from robot_io.messages import LinkState
@@ -22,7 +23,6 @@ MOST_RESUMES = 3
 """After these the operator looks for the cause and starts anew."""
 OVERDUE_CONTACT_M = 0.5
 """Without contact this far beyond the expected place, the object is considered missing."""
-BACKWARD_RAD = math.pi / 2
 MOVING = (Phase.APPROACH, Phase.PUSH, Phase.LOST, Phase.RETREAT)
 """Phases that go on only while the base may move. In all others it stands anyway, and they go on while it is held."""
 S = 1e-9
@@ -198,15 +198,7 @@ def _push(settings: Settings, state: ControlState, inp: TickInput, contact: tupl
     size = math.hypot(state.force_world[0], state.force_world[1])
     state = replace(state, contact=contact_threshold.learn(state.contact, size, state.progress_m, control.force_min_N))
     force = settings.path.vector_to_path(state.force_world[0], state.force_world[1])
-    theta_f = push_law.force_angle(*force)
-    if control.controller == "force":
-        theta_p = push_law.push_angle(theta_f, state.lateral_m, control.k_f, control.k_y_rad_per_m)
-    else:
-        theta_p = open_loop.push_angle()
-    if abs(theta_p) > BACKWARD_RAD:
-        # Beyond 90 degrees the law would pull: the direction is kept and safety counts the ticks (F56).
-        return replace(state, theta_f=theta_f, speed=speed, backward_ticks=state.backward_ticks + 1)
-    return replace(state, theta_f=theta_f, theta_p=theta_p, speed=speed, backward_ticks=0)  # not a number: F58 at once
+    return steer(settings, state, inp, force, speed)
 
 
 def _without_force(
@@ -227,7 +219,7 @@ def _without_force(
     gone_m = math.hypot(contact[0] - state.anchor_x, contact[1] - state.anchor_y)
     if gone_s > control.lost_time_s or gone_m > control.lost_distance_m:
         return _enter(state, Phase.LOST_HOLD, inp.now_ns, speed=0.0)
-    k_y = control.k_y_rad_per_m if control.controller == "force" else 0.0
+    k_y = control.k_y_rad_per_m if settings.law.returns_to_path else 0.0
     turn = control.lost_turn_rate_rad_per_s * settings.period_s
     return replace(state, theta_p=push_law.return_angle(state.theta_p, state.lateral_m, k_y, turn), speed=speed)
 

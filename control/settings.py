@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import msgspec
 
+from control.laws.applied import AppliedLaw
+from control.laws.law import Law
+from control.laws.shipped import shipped_law
 from control.tare import SMALLEST_COUNT, Flags6
 from robot_io.geometry import StraightPath
 from robot_io.messages import Vector6
@@ -19,6 +22,7 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     """Gains, path and constants of the rig; `in_contact`: start in contact, without approach and with a saved tare."""
 
     control: ControlConfig
+    law: AppliedLaw
     sensor_noise: Vector6
     """One standard deviation of each axis at rest: N, N*m."""
     sensor_range: Vector6
@@ -46,11 +50,12 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     """Whether each axis of the sensor scatters at rest, so that one that does not is dead."""
 
     @classmethod
-    def of(cls, rig: RigConfig, *, in_contact: bool = False) -> Settings:
-        """Resolve the settings of a rig."""
+    def of(cls, rig: RigConfig, *, in_contact: bool = False, law: Law | None = None) -> Settings:
+        """Resolve the settings of a rig. law: its law where it is not a shipped one; raises ConfigError without it."""
         contact_x, contact_y, _ = rig.frames.contact_in_base_m
         return cls(
             rig.control,
+            AppliedLaw(shipped_law(rig.control) if law is None else law),
             rig.ft.noise,
             rig.ft.declared.range,
             rig.ft.declared.resolution,

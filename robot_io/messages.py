@@ -15,7 +15,7 @@ import msgspec
 
 from robot_io.named_values import ArmError as ArmError
 from robot_io.named_values import Latch
-from robot_io.odometry_pose import OdometryPose
+from robot_io.odometry_pose import OdometryPose as OdometryPose
 
 T = TypeVar("T")
 Vector3 = tuple[float, float, float]

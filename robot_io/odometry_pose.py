@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 
 NO_COVARIANCE = (0.0,) * 36
@@ -20,3 +22,9 @@ class OdometryPose(msgspec.Struct, frozen=True, gc=False):
     covariance: tuple[float, ...] = NO_COVARIANCE
     """6x6 of the pose, row by row: x y z, rotations about x y z."""
     twist_covariance: tuple[float, ...] = NO_COVARIANCE
+
+    @property
+    def whole(self) -> bool:
+        """Return whether all numbers are there and finite, as a standard message needs them."""
+        parts = (self.position, self.orientation, self.covariance, self.twist_covariance)
+        return tuple(map(len, parts)) == (3, 4, 36, 36) and all(math.isfinite(x) for part in parts for x in part)

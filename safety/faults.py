@@ -155,6 +155,8 @@ FAULTS: dict[str, Fault] = dict(
         _row("F55-slow", "the base or the object comes near the edge of the workspace", Mode.SLOW, _A, 1),
         _row("F55-stop", "the base or the object is about to leave the workspace", Mode.STOP, _L, 1),
         _row("F56", "the law pushes backward (beyond 90 degrees)", Mode.STOP, _L, 20),
+        _row("F57", "the law failed: it raised an exception, or what it returned cannot be used", Mode.STOP, _L, 1),
+        _row("F57-slow", "a step of the law took too long", Mode.STOP, _L, 1),
         _row("F58", "the law returned a direction that is not a number", Mode.STOP, _L, 1),
         _row("F59", "the base does not move in the direction that was asked for", Mode.STOP, _L, 100),
         _row("F60-late", "ticks of the loop were skipped", _WARN, _A, 0),

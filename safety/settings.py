@@ -30,6 +30,9 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
     """Limits in SI units and times in ns."""
 
     period_ns: int
+    law_ns: int
+    """A step of the law may take this long."""
+    law_ms: float
     max_force: float
     slow_force: float
     max_torque: float
@@ -75,6 +78,8 @@ class SafetySettings(msgspec.Struct, frozen=True, gc=False):
         fx, fy, fz, mx, my, mz = rig.ft.declared.range
         return cls(
             period_ns,
+            round(limits.law_ms * 1e6),
+            limits.law_ms,
             limits.max_force_N,
             limits.slow_force_N,
             limits.max_torque_Nm,

@@ -35,7 +35,7 @@ COMMANDS = {
     "run": Command(
         "tools.commands.run",
         "one push, on hardware, emulated or simulated",
-        ("push run emulated --distance-m 2", "push run sim --fast --seed 3 --json"),
+        ('push run emulated --distance-m 2 --note "box, 2 kg"', "push run sim --fast --trials 3 --json"),
     ),
     "stop": Command(
         "tools.commands.stop",
@@ -123,8 +123,15 @@ COMMANDS = {
 ACTIONS = {
     "log info": ("push log info runs/demo", "push log info runs/demo --json"),
     "log cat": ("push log cat runs/demo --topics /safety/event", "push log cat runs/demo | head -3"),
-    "log export": ("push log export runs/demo", "push log export runs/demo --topics /ft/wrench --out tables"),
+    "log export": ("push log export runs/demo", "push log export runs/demo --signals"),
     "log recover": ("push log recover runs/demo", "push log recover runs/demo --out whole.mcap"),
+    "log zip": ("push log zip runs/demo", "push log zip runs --out artifact.zip"),
+    "calibrate bias": ("push calibrate bias --rehearse", "push calibrate bias my-rig.toml --seconds 120 --json"),
+    "calibrate sign": ("push calibrate sign --rehearse", "push calibrate sign my-rig.toml --apply my-rig.toml"),
+    "calibrate frame": ("push calibrate frame my-rig.toml --cord", "push calibrate frame --from runs/one runs/two"),
+    "calibrate contact": ("push calibrate contact --rehearse", "push calibrate contact my-rig.toml --marking-mm 2"),
+    "calibrate marker": ("push calibrate marker --rehearse", "push calibrate marker my-rig.toml --out marker.toml"),
+    "calibrate path": ("push calibrate path my-rig.toml --two-places", "push calibrate path --rehearse --json"),
     "emulate ft300": ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate ft300 --streaming --latency-ms 16"),
     "emulate ur10": ("push emulate ur10", "push emulate ur10 --host 127.0.0.11 --json"),
     "emulate ridgeback": ("push emulate ridgeback", "push emulate ridgeback --port 0 --json"),

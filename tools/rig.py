@@ -15,6 +15,7 @@ from robot_io.rig.fault_words import parse_fault
 from robot_io.rig.files import shipped_rigs
 from robot_io.rig.types import Matrix3
 from tools.kinds import is_shipped, query_kinds
+from tools.laws import with_law
 
 ROTATION_TOLERANCE = 1e-6
 LONGEST_NAME = 64
@@ -27,7 +28,8 @@ def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigC
     """
     from safety import limits
 
-    rig, problems = _with_kinds(load_rig(name_or_path, overrides), folder_of(name_or_path))
+    folder = folder_of(name_or_path)
+    rig, problems = _with_kinds(with_law(load_rig(name_or_path, overrides), folder), folder)
     problems += _name_problems(rig) + _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
     check_faults(rig)
     if not is_rotation(rig.frames.base_from_sensor):

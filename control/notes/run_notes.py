@@ -79,6 +79,7 @@ def outcome(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, o
         "first_fault": safety.first_fault,
         "first_value": safety.first_value if math.isfinite(safety.first_value) else None,
         "first_fault_s": (safety.first_fault_ns - safety.first_ns) * 1e-9 if safety.first_fault else None,
+        "law_error": control.law_error,
         "latch_cause": inp.base.latch_cause,
         "log_dropped": inp.host.log_dropped,
         "contact_seen": control.contact_seen,

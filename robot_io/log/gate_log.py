@@ -105,7 +105,7 @@ class GateLog:
             return
         placed, frame, child = _UNKNOWN, WORLD_FRAME, BASE_FRAME
         covariance: tuple[float, ...] = NO_COVARIANCE
-        if came is not None:
+        if came is not None and came.whole:
             pose = Pose(Point(*came.position), Quaternion(*came.orientation))
             placed, covariance = PoseWithCovariance(pose, came.covariance), came.twist_covariance
             frame, child = came.frame, came.child_frame

@@ -21,10 +21,13 @@ from robot_io.rig import toml as toml_text
 from robot_io.rig.calibration import CalibrationConfig
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.renames import name_today
 from robot_io.rig.task import FaultsConfig, GoalConfig, PathConfig, SlidersConfig, WorkspaceConfig
 from robot_io.rig.topics import TopicsConfig
-from robot_io.rig.types import InBase, Joints, Level, Matrix3, NonNegative, Options, Positive, Table
+from robot_io.rig.types import InBase, Joints, LawFacts, Level, Matrix3, NonNegative, Options, Positive, Table
 from robot_io.rig.world import WorldConfig
+
+_LAW = ("control", "law")
 
 
 class LoopConfig(Table, frozen=True):
@@ -119,7 +122,8 @@ class FramesConfig(Table, frozen=True):
 class ControlConfig(Table, frozen=True):
     """Gains and speeds of the push."""
 
-    controller: Literal["force", "open-loop"] = "force"
+    law: str = "force"
+    """`force` (the paper's), `force-integral`, `open-loop`, `line`, or your own: `module:Class` (docs/own-law.md)."""
     k_f: Annotated[float, Meta(ge=0, le=2)] = 0.3
     k_y_rad_per_m: Annotated[float, Meta(ge=0, le=2)] = 0.2
     push_speed_m_per_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.1
@@ -148,6 +152,10 @@ class ControlConfig(Table, frozen=True):
     """... and the run ends after this long at rest, unless the operator resumes."""
     retreat_m: Annotated[float, Meta(ge=0, le=0.2)] = 0.05
     """How far the base backs off after the push, so that the sensor can be checked out of contact (0: not at all)."""
+    law_settings: Options = msgspec.field(default_factory=dict)
+    """What the law adds to `[control]` (docs/laws.md). A law given on the command line begins with its own defaults."""
+    law_facts: LawFacts = LawFacts()
+    """What a law of your own declares, filled in at the start of a run: not for you to write."""
 
 
 class LimitsConfig(Table, frozen=True):
@@ -165,6 +173,8 @@ class LimitsConfig(Table, frozen=True):
     max_yaw_acceleration_rad_per_s2: Annotated[float, Meta(gt=0, le=1.0)] = 0.5
     max_heading_error_deg: Annotated[float, Meta(gt=0, le=20)] = 5.0
     """Turned away this far from its heading at the start, the base stops (F44)."""
+    law_ms: Annotated[float, Meta(gt=0, le=5)] = 1.0
+    """A step of a law of your own may take this long (F57-slow)."""
     drift_hold_rad: Positive = 0.005
     """Drift of an arm joint at which the base holds ..."""
     drift_stop_rad: Positive = 0.01
@@ -244,7 +254,13 @@ def rig_from_toml(text: str, name: str = "rig", overrides: Sequence[str] = (), *
 def _lay_over(
     data: dict[str, Any], origins: toml_text.Origins, overrides: Sequence[str], option: str = "--set"
 ) -> None:
-    for setting in overrides:
-        key, value = toml_text.parse_setting(setting, option)
+    parsed = [toml_text.parse_setting(setting, option) for setting in overrides]
+    settings = [(name_today(key, option), value) for key, value in parsed]
+    # The law first: another one than the file's begins with its own defaults, which further settings may change.
+    for key, value in sorted(settings, key=lambda item: item[0] != _LAW):
+        control = data.get("control")
+        if key == _LAW and isinstance(control, dict) and control.get("law", "force") != value:
+            control.pop("law_settings", None)
+            control.pop("law_facts", None)
         toml_text.put(data, key, value, option)
         origins[key] = f"{option} {'.'.join(key)}"

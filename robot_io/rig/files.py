@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from robot_io.errors import ConfigError
 from robot_io.rig import toml as toml_text
+from robot_io.rig.renames import use_todays_names
 from robot_io.rig.toml import KeyPath, Origins
 
 RIGS_DIR = Path(__file__).parent
@@ -136,7 +137,9 @@ def _parse(path: Path) -> Written:
         text = path.read_text(encoding="utf-8-sig")  # a byte order mark, as some editors write, is not a mistake
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot read it: {error}", where=str(path)) from None
-    return Written(*toml_text.parse(text, str(path)))
+    data, origins = toml_text.parse(text, str(path))
+    use_todays_names(data, origins, str(path))
+    return Written(data, origins)
 
 
 def _is_file(path: Path) -> bool:

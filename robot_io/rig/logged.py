@@ -20,8 +20,8 @@ class LoggedRig(NamedTuple):
 def rig_of_log(text: str, log_format: int, name: str = "config.toml") -> LoggedRig:
     """Read the config of a log. Raises ConfigError, with `name` as its place, when it is none of that format."""
     data, origins = toml_text.parse(text, name)
-    for old, new, last_format in renames.RENAMED:
-        if log_format <= last_format and (found := _taken(data, old)):
+    for old, new, last_format, still_read in renames.RENAMED:
+        if (log_format <= last_format or still_read) and (found := _taken(data, old)):
             toml_text.put(data, _path(new), found[0])
     ignored = [
         key for key, last_format in renames.RETIRED if log_format <= last_format and _taken(data, key) is not None

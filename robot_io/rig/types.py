@@ -36,6 +36,17 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of a rig file: frozen, unknown keys refused."""
 
 
+class LawFacts(Table, frozen=True):
+    """What a law of one's own declares: empty for a shipped law."""
+
+    name: str = ""
+    """What it is called in reports."""
+    source_sha256: str = ""
+    """Of the file it is in, hexadecimal."""
+    state: tuple[str, ...] = ()
+    """The name of each number of its state, in the order in which the log has them."""
+
+
 def row_of(kind: Any) -> type[msgspec.Struct] | None:
     """Return the table of which a field of this type holds a list; None for any other field."""
     parts = get_args(kind)

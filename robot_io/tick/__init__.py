@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from robot_io.tick.control_state import REST_M_PER_S, REST_NS, ContactState, ControlState, Phase, TareSums
 from robot_io.tick.field_types import Counts6
-from robot_io.tick.input import FtInput, FtReading, HostInput, Operator, TickInput
+from robot_io.tick.input import FtInput, FtReading, HostInput, Operator, TickInput, link_number
 from robot_io.tick.record import TICK_CDR, ControlTick, TickOutput, TickState
 from robot_io.tick.safety_state import (
     ClockState,
@@ -47,4 +47,5 @@ __all__ = [
     "TickOutput",
     "TickState",
     "WorkspaceState",
+    "link_number",
 ]

@@ -148,3 +148,7 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     """How often the operator has resumed the push."""
     resume_refused: bool = False
     """Whether a further resume was refused in this rest."""
+    law_state: tuple[float, ...] = ()
+    """What the law remembers, as numbers; their names are in the log's metadata. Empty before its first step."""
+    law_error: str = ""
+    """What the law did wrong; "" while it has not."""

@@ -18,6 +18,11 @@ class Operator(IntEnum):
     RESUME = 2
 
 
+def link_number(state: int) -> int:
+    """Return a driver's `LinkState` as a record holds it: one that is none of a driver's is that of a lost link."""
+    return int(state) if 0 <= state < 2**8 else int(LinkState.LOST)
+
+
 class FtReading(msgspec.Struct, frozen=True, gc=False):
     """One packet of the force-torque sensor: N, N*m in the SENSOR frame, bias still in it."""
 
@@ -58,6 +63,8 @@ class HostInput(msgspec.Struct, frozen=True, gc=False):
     """CLOCK_BOOTTIME minus CLOCK_MONOTONIC: grows only while this machine is suspended (0 at level sim)."""
     last_tick_ns: int = 0
     """How long the tick before this one took, from its waking to the end of its record (0 at level sim)."""
+    law_ns: int = 0
+    """How long the law's last step took, told once; 0 for a shipped law, and at level sim within the limit."""
 
 
 class TickInput(msgspec.Struct, frozen=True, gc=False):

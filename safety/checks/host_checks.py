@@ -33,4 +33,6 @@ def check(settings: SafetySettings, state: SafetyState, inp: TickInput) -> tuple
         faults.append(Finding("F73-stop", host.launcher_silent_ns / NS_PER_MS))
     elif host.launcher_silent_ns >= LAUNCHER_HOLD_NS:
         faults.append(Finding("F73-hold", host.launcher_silent_ns / NS_PER_MS))
+    if host.law_ns > settings.law_ns:
+        faults.append(Finding("F57-slow", host.law_ns / NS_PER_MS))
     return replace(state, late_run=run, recorder_gone_ns=gone_ns), faults

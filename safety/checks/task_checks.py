@@ -38,6 +38,8 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
         faults.append("F52-hold" if control.contact_seen else Finding("F53", control.felt_N))
     if control.resume_refused:
         faults.append(Finding("F52-refused", control.resumes))
+    if control.law_error:
+        faults.append("F57")
     if control.backward_ticks >= BACKWARD_TICKS:
         faults.append(Finding("F56", control.backward_ticks))
     if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):

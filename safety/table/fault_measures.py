@@ -69,6 +69,7 @@ MEASURES: dict[str, Measure] = {
     "F55-slow": Measure("room beyond two stopping distances", 0.0, "m"),
     "F55-stop": Measure("room beyond the stopping distance", 0.0, "m"),
     "F56": Measure("ticks in which the law pushed backward", 20.0, "ticks"),
+    "F57-slow": Measure("time of the step before this tick", "law_ms", "ms"),
     "F59": Measure("angle between the way by pose and the way asked for", 15.0, "degrees"),
     "F60-slow": Measure("time overrun", 30.0, "ms"),
     "F61": Measure("time that passed unseen between two ticks", 20.0, "ms"),

@@ -41,6 +41,14 @@ TASK_ADVICE: dict[str, Advice] = {
         "The force points the wrong way: wrong frames or signs, or gains that are too high for this object.",
         "Check the signs (docs/frames-and-signs.md), and the gains with `push tune`.",
     ),
+    "F57": Advice(
+        "A defect in a law of your own; the run's notes have its words.",
+        "Replay the log with the law: it shows the tick at which it happened; mend the law.",
+    ),
+    "F57-slow": Advice(
+        "A law of your own that computes for too long, reads files or waits.",
+        "Let it compute beforehand what it can; raise `limits.law_ms` if the loop has the time.",
+    ),
     "F58": Advice(
         "A gain or setting that is out of bounds, or a defect in a law of your own.",
         "Replay the log: it shows the tick at which it happened.",

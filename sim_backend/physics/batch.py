@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_io.errors import EnvironmentFault
-from sim_backend.physics.lanes import Lane, LaneEnd, LaneResult, Timing
+from sim_backend.physics.lanes import FADE_M, MAX_INTEGRAL_RAD, Lane, LaneEnd, LaneResult, Timing
 
 try:
     from numba import njit
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-PARAMETERS = 13
+PARAMETERS = 14
+LAW_NUMBERS = {"force": 0.0, "open-loop": 1.0, "line": 2.0, "force-integral": 3.0}
 STATISTICS = 9
 """Columns of a result row: end, steps, max |y|, max |y_c|, max |theta_p|, min v_n/|v|, sticking, left, right."""
 
@@ -40,7 +41,8 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
         reach, half_width, d, mu = lanes[i, 1], lanes[i, 2], lanes[i, 3], lanes[i, 4]
         y, phi, s = lanes[i, 5], lanes[i, 6], lanes[i, 7]
         gain_f, k_y, speed, f_max = lanes[i, 8] + 1.0, lanes[i, 9], lanes[i, 10], lanes[i, 11]
-        open_loop = lanes[i, 12] != 0.0
+        law, k_i = lanes[i, 12], lanes[i, 13]
+        way, integral = speed * dt, 0.0
         x, fx, fy = 0.0, 1.0, 0.0
         v_x, v_y = fx, fy  # the slider's centre moves along the force, so this gives the force's direction earlier
         straight = 0.0 if is_round else 1.0
@@ -74,7 +76,16 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
             if abs(s) > half_width:
                 end = 1
                 break
-            theta_p = 0.0 if open_loop else gain_f * atan2(v_y, v_x) + k_y * y_c
+            if law == 0.0:
+                theta_p = gain_f * atan2(v_y, v_x) + k_y * y_c
+            elif law == 1.0:
+                theta_p = 0.0
+            elif law == 2.0:
+                theta_p = -k_y * y_c
+            else:
+                change = k_i * FADE_M / max(step * way, FADE_M) * y_c * way
+                integral = min(max(integral + change, -MAX_INTEGRAL_RAD), MAX_INTEGRAL_RAD)
+                theta_p = gain_f * atan2(v_y, v_x) + k_y * y_c + integral
             max_theta = max(max_theta, abs(theta_p))
             ratio = cos(theta_p - psi)
             min_ratio = min(min_ratio, ratio)
@@ -145,12 +156,12 @@ def run_batch(lanes: Sequence[Lane], timing: Timing) -> tuple[list[LaneResult], 
 
 
 def parameters(lanes: Sequence[Lane]) -> Floats:
-    """Return lanes as the rows of numbers the kernel takes, shape (lanes, 13)."""
+    """Return lanes as the rows of numbers the kernel takes, shape (lanes, 14)."""
     rows = [
         (
             lane.round, lane.reach_m, np.inf if lane.round else lane.half_width_m, lane.d_m, lane.contact_friction,
             lane.y0_m, lane.phi0_rad, lane.s0_m, lane.k_f, lane.k_y_rad_per_m, lane.speed_m_per_s, lane.f_max_N,
-            lane.open_loop,
+            LAW_NUMBERS[lane.law], lane.k_i_rad_per_m2,
         )
         for lane in lanes
     ]  # fmt: skip

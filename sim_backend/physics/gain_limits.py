@@ -107,6 +107,47 @@ def _slope(body: PushedBody) -> float:
     return 1 / (body.along_over_across**2 + body.rho_m * (body.rho_m + body.shift_m) / body.d_m**2)
 
 
+def integral_limit(bodies: Iterable[PushedBody], k_f: float, k_y_rad_per_m: float) -> float:
+    """Return the greatest k_i (rad/m^2) of the law with integral that is stable for every body.
+
+    0: none is, because the paper's law with these gains is not. Derived in docs/laws.md.
+    """
+    bodies = tuple(bodies)
+    if k_y_rad_per_m >= limit(bodies, k_f):
+        return 0.0
+    return min(
+        min(sticking_integral_limit(body, k_f, k_y_rad_per_m), frictionless_integral_limit(body, k_f, k_y_rad_per_m))
+        for body in bodies
+    )
+
+
+def sticking_integral_limit(body: PushedBody, k_f: float, k_y: float) -> float:
+    """Return the greatest stable k_i (rad/m^2) while the contact sticks, for a k_y that is stable without it."""
+    slope = body.along_over_across**2 + body.rho_m * (body.rho_m + body.shift_m) / body.d_m**2
+    p = slope / (slope - k_f - 1)
+    m = p * sticking_limit(body, k_f)
+    return _third_order_limit(m, p, body.along_over_across**2 * m / _kappa(body, k_f), k_y)
+
+
+def frictionless_integral_limit(body: PushedBody, k_f: float, k_y: float) -> float:
+    """Return the greatest stable k_i (rad/m^2) of a contact without friction, for a k_y that is stable without it."""
+    kappa, square = _kappa(body, k_f), body.along_over_across**2
+    if body.round:
+        reach = body.rho_m + body.ball_radius_m
+        return _third_order_limit(kappa / reach, 1.0, square / reach, k_y)
+    h = (body.rho_m + body.shift_m + body.ball_radius_m) / body.d_m**2
+    e, n = square / body.d_m**2, kappa / body.d_m**2
+    a, b, a3 = n - k_y * h, k_y * e, h - k_y
+    # h k_y k_i^2 + linear k_i < free, below its positive root
+    linear, free = a3 * (a * h + b) - 2 * b * h + a3 * a3 * e, b * (a3 * a - b)
+    return 2 * free / (linear + sqrt(linear * linear + 4 * h * k_y * free))
+
+
+def _third_order_limit(m: float, p: float, r: float, k_y: float) -> float:
+    left = m - p * k_y
+    return r * k_y * left / (r + p * left)
+
+
 def offset_per_degree_m(k_f: float, k_y_rad_per_m: float) -> float:
     """Return the steady lateral offset (m) that one degree of error in the force's angle costs."""
     return (1 + k_f) / k_y_rad_per_m * radians(1)

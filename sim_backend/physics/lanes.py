@@ -12,11 +12,15 @@ from __future__ import annotations
 
 from enum import IntEnum
 from math import atan2, cos, sin
+from typing import Literal
 
 import msgspec
 
 from sim_backend.physics.slider_exact import ContactSolver, Moving, solve_exact
 
+LaneLaw = Literal["force", "open-loop", "line", "force-integral"]
+"""The shipped laws, as a rig names them."""
+MAX_INTEGRAL_RAD, FADE_M = 0.5, 6.0
 State = tuple[float, float, float, float, float, float]
 """x, y (m), phi (rad), s (m), fx, fy (N, path frame)."""
 
@@ -52,7 +56,9 @@ class Lane(msgspec.Struct, frozen=True):
     k_y_rad_per_m: float = 0.01
     speed_m_per_s: float = 0.1
     f_max_N: float = 1.0
-    open_loop: bool = False
+    law: LaneLaw = "force"
+    k_i_rad_per_m2: float = 0.0
+    """Of the law with integral; its other settings are `MAX_INTEGRAL_RAD` and `FADE_M`."""
 
 
 class Timing(msgspec.Struct, frozen=True):
@@ -89,7 +95,7 @@ def simulate_lane(
 ) -> tuple[LaneResult, tuple[State, ...]]:
     """Run one lane; return its result and the states recorded until it ended."""
     x, y, phi, s = 0.0, lane.y0_m, lane.phi0_rad, lane.s0_m
-    fx, fy = 1.0, 0.0
+    fx, fy, integral = 1.0, 0.0, 0.0
     records: list[State] = []
     max_y = max_y_c = max_theta = 0.0
     min_ratio, counts, end = 1.0, [0, 0, 0], LaneEnd.OK
@@ -109,7 +115,16 @@ def simulate_lane(
         if not lane.round and abs(s) > lane.half_width_m:
             end = LaneEnd.EDGE
             break
-        theta_p = 0.0 if lane.open_loop else (lane.k_f + 1.0) * atan2(fy, fx) + lane.k_y_rad_per_m * y_c
+        theta_p = 0.0
+        if lane.law in ("force", "force-integral"):
+            theta_p = (lane.k_f + 1.0) * atan2(fy, fx) + lane.k_y_rad_per_m * y_c
+        if lane.law == "line":
+            theta_p = -lane.k_y_rad_per_m * y_c
+        if lane.law == "force-integral":
+            way = lane.speed_m_per_s * timing.dt_s
+            gain = lane.k_i_rad_per_m2 * FADE_M / max(step * way, FADE_M)
+            integral = min(max(integral + gain * y_c * way, -MAX_INTEGRAL_RAD), MAX_INTEGRAL_RAD)
+            theta_p += integral
         max_theta = max(max_theta, abs(theta_p))
         vx = lane.speed_m_per_s * cos(theta_p - phi)
         vy = lane.speed_m_per_s * sin(theta_p - phi)

@@ -36,8 +36,9 @@ class Human:
         self._presses: list[_Press] = []
         self._arm = ArmTruth(held, AT_REST)
         self._move: _Move | None = None
-        for press in presses:
-            self.press(press.force_body_N, press.for_s, start_ns + round(press.at_s * NS_PER_S))
+        for press in presses:  # not by `press`, which drops those that are over by then: all of these are still to come
+            at_ns = start_ns + round(press.at_s * NS_PER_S)
+            self._presses.append(_Press(at_ns, at_ns + round(press.for_s * NS_PER_S), press.force_body_N))
 
     def press(self, force: Vector3, for_s: float, at_ns: int) -> None:
         """Press on the ball with a force (N, BODY frame) from `at_ns` on; it adds to other presses."""

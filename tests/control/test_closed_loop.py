@@ -145,7 +145,7 @@ def reaches_six_metres(seed, gains, rig=()):
 
 
 def loses_the_object(seed, rig=()):
-    loop = ClosedLoop(("control.distance_m=6", 'control.controller="open-loop"', *rig), seed)
+    loop = ClosedLoop(("control.distance_m=6", 'control.law="open-loop"', *rig), seed)
     output = loop.run()
     assert output.exit_code == 6
     # The search and the brake add up to 0.31 m after the force was lost.

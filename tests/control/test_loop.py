@@ -243,3 +243,21 @@ def test_a_tick_that_failed_holds_the_state_before_it(bench):
     bench.loop._give_up(good.inp, ZeroDivisionError())
     assert [len(tick.before) for tick in pushed] == [1, 1]
     assert [tick.input.host.loop_error for tick in pushed] == [False, True]
+
+
+def test_how_long_a_tick_took_is_told_to_the_next(bench):
+    loop, now_ns, told = bench.loop, [5_000_000_000], []
+    loop._clock = lambda: now_ns[0]
+
+    def one_tick(inp):
+        told.append(inp.host.last_tick_ns)
+        now_ns[0] += 1_250_000 * (len(told))
+
+    loop._one_tick = one_tick
+    deadline_ns = now_ns[0]
+    for _ in range(3):
+        now_ns[0] = deadline_ns
+        loop._on_deadline(deadline_ns)
+        deadline_ns = loop._timer.deadline_ns
+        loop._timer.cancel()
+    assert told == [0, 1_250_000, 2_500_000]

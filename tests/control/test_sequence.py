@@ -225,7 +225,7 @@ def test_the_world_velocity_is_turned_by_the_measured_heading_and_the_heading_he
 
 
 def test_the_open_loop_baseline_goes_straight_whatever_it_feels():
-    bench = pushing(('control.controller="open-loop"', "control.force_filter_tau_s=0"))
+    bench = pushing(('control.law="open-loop"', "control.force_filter_tau_s=0"))
     bench.force_path = (10.0, 10.0)
     bench.pose = replace(bench.pose, y=0.02)
     felt(bench)
@@ -328,7 +328,7 @@ def test_without_force_the_law_is_not_evaluated_and_the_pusher_turns_back():
 @pytest.mark.parametrize("lateral", [0.02, -0.02])
 def test_the_open_loop_baseline_searches_straight_ahead(lateral):
     """It knows no k_y: 2 cm beside the path it goes on along the path, touching or not."""
-    bench = pushing(("control.force_filter_tau_s=0", "control.controller=open-loop"))
+    bench = pushing(("control.force_filter_tau_s=0", "control.law=open-loop"))
     carried_to(bench, y=lateral)
     bench.fold(no_force)
     for n in range(45):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import csv
+import importlib.util
 import json
 import os
 import re
@@ -168,7 +170,7 @@ def test_log_reading_snippets_work(tmp_path):
         capture_output=True, text=True, timeout=60, check=True,
     )  # fmt: skip
     ticks = json.loads(done.stdout)["loop"]["ticks"]
-    blocks = python_blocks("docs/logs.md")
+    *blocks, table = python_blocks("docs/logs.md")
     assert [re.search(r"mcap_ros2|rosbags", block)[0] for block in blocks] == ["mcap_ros2", "rosbags"]
     for block in blocks:
         done = subprocess.run(
@@ -177,6 +179,25 @@ def test_log_reading_snippets_work(tmp_path):
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
         assert len(done.stdout.splitlines()) == ticks
+    check_table_snippet(table, tmp_path)
+
+
+def check_table_snippet(block: str, cwd: Path) -> None:
+    """Five lines of pandas, which is no dependency: run where it is installed; its columns must be there anyway."""
+    [command] = re.findall(r"push log export runs/first --signals(?= )(?! --to)", (ROOT / "docs/logs.md").read_text())
+    subprocess.run([PUSH, *command.split()[1:]], cwd=cwd, capture_output=True, timeout=60, check=True)
+    with (cwd / "runs/first/run_signals.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert "run_signals.csv" in block
+    assert len([line for line in block.splitlines() if line.strip()]) <= 5
+    named = set(re.findall(r'"([a-z_]+)"', block)) | set(re.findall(r"table\.([a-z]+) ==", block))
+    values = {row["phase"] for row in rows}
+    assert "push" in named
+    assert named - {"push"} <= set(rows[0])
+    assert "push" in values
+    if importlib.util.find_spec("pandas"):
+        done = subprocess.run([sys.executable, "-c", block], cwd=cwd, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
 
 
 def test_the_snippet_of_a_wire_fault_works():

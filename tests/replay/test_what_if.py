@@ -158,6 +158,15 @@ def test_the_log_s_own_value_changes_nothing(sim_log, capsys):
     assert (told["new_faults"], told["missing_faults"], told["not_run"], told["notes"]) == ([], [], 0, [])
 
 
+def test_a_log_of_the_wall_clock_is_answered_too(emulated_run, capsys):
+    log = emulated_run / "run.mcap"
+    own = what_if(capsys, log, "control.k_f=0.3")
+    assert (own["changed"], own["exact_to_tick"], own["notes"]) == (0, None, [])
+    told = what_if(capsys, log, *FORCE_LIMIT)
+    assert told["new_faults"][0]["id"] == "F50-stop"
+    assert told["what_if_end"]["exit_code"] == 5
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "setting",
@@ -229,6 +238,11 @@ def test_what_is_no_setting_is_usage(setting, sim_log, capsys):
     assert code == 2
     assert told["error"]["what"]
     assert told["error"]["where"].startswith("--what-if")
+
+
+def test_a_tolerance_is_refused_beside_it(sim_log, capsys):
+    code, told = replayed(capsys, sim_log, "--what-if", "control.k_f=0.1", "--tolerance", "1e-9")
+    assert (code, told["error"]["where"]) == (2, "push replay")
 
 
 def test_a_gap_before_the_first_difference_is_bridged_by_the_log_s_state(

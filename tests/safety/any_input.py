@@ -10,7 +10,7 @@ import math
 import random
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec.structs import replace
@@ -25,6 +25,8 @@ FLOATS = (
 INTEGERS = (0, 1, -1, 2, 3, 5, 7, 20, 255, 256, 2**31 - 1, 2**31, -(2**31), 2**53, 2**62, -(2**62))
 MOST = 2**62
 """More is reached by no counter, and by no clock in nanoseconds in a century."""
+MOST_OF = {"uint8": 2**8 - 1, "uint32": 2**32 - 1}
+"""What a field of this width holds; no driver or process passes on more."""
 OFFSETS_NS = (1, -1, 10**7, -(10**7), -5 * 10**7, -(10**8), -2 * 10**8, -(10**9), 10**9, -(10**10), 10**12)
 HOWS = ("value", "value", "frozen", "offset", "scaled")
 
@@ -61,7 +63,7 @@ def places() -> tuple[Place, ...]:
 
 def _places_in(struct: type[msgspec.Struct], prefix: str) -> list[Place]:
     found: list[Place] = []
-    for name, kind in get_type_hints(struct).items():
+    for name, kind in get_type_hints(struct, include_extras=True).items():
         if name.startswith("__") or f"{prefix}{name}" in OWN:
             continue
         inner = _places_of(kind, f"{prefix}{name}")
@@ -75,6 +77,10 @@ def _places_of(kind: Any, name: str) -> list[Place]:
         return _places_in(kind, f"{name}.")
     if get_origin(kind) is tuple and Ellipsis not in get_args(kind):
         return [_element(i, place) for i, one in enumerate(get_args(kind)) for place in _places_of(one, f"{name}[{i}]")]
+    if get_origin(kind) is Annotated:
+        base, width, *_ = get_args(kind)
+        most = MOST_OF[width]
+        return [place._replace(put=lambda _, new: min(max(new, 0), most)) for place in _places_of(base, name)]
     if kind in (float, int, bool):
         return [Place(name, kind, lambda value: value, lambda _, new: new)]
     raise TypeError(f"{name}: nothing is known of {kind}")

@@ -12,6 +12,7 @@ from control.sensing import counted
 from robot_io.messages import BaseStatus, BodyTwist, Pose2D
 from robot_io.tick import ControlState, Operator, Phase, TickInput, TickState
 from tests.safety.fold_bench import BIAS, GAP_M, PERIOD_NS, Alter, FoldBench, pushing, with_force, without_contact
+from tools.faults.bad_laws import BadLaw, Forgetful, Infinite, Raising, steered_by
 from tools.run.tick_core import TickCore
 
 UNFILTERED = ("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0")
@@ -316,12 +317,15 @@ def pushing_sideways() -> FoldBench:
     return bench
 
 
-def pushing_by_no_law() -> FoldBench:
-    """Return a bench whose law gives no number from the next tick on, as by a defect."""
-    bench = pushing()
-    settings = bench.core.control
-    bench.core = replace(bench.core, control=replace(settings, control=replace(settings.control, k_f=NAN)))
-    return bench
+def pushing_by(law: BadLaw) -> Callable[[], FoldBench]:
+    """Return a function that returns a bench whose law has a defect from the next tick on."""
+
+    def start() -> FoldBench:
+        bench = pushing()
+        bench.core = steered_by(law)(bench.core)
+        return bench
+
+    return start
 
 
 def shaking(inp: TickInput, n: int) -> TickInput:
@@ -511,7 +515,11 @@ SCENARIOS = [
     Scenario("F54-hold", "110 N", pressed(110.0), warm=1002, also=frozenset({"F50-slow"})),
     Scenario("F54-hold", "four times the usual", pressed(62.0), pushing_for_a_while, warm=1006),
     Scenario("F56", "backward", lambda inp, _: inp, pushing_sideways),
-    Scenario("F58", "no number", lambda inp, _: inp, pushing_by_no_law),
+    Scenario("F57", "it raises", lambda inp, _: inp, pushing_by(Raising())),
+    Scenario("F57", "another state", lambda inp, _: inp, pushing_by(Forgetful())),
+    Scenario("F57-slow", "1 ms and a bit", host(law_ns=1_000_001)),
+    Scenario("F58", "no number", lambda inp, _: inp, pushing_by(BadLaw())),
+    Scenario("F58", "infinite", lambda inp, _: inp, pushing_by(Infinite())),
     # --- host
     Scenario("F60-late", "one tick skipped", host(skipped=1), before=lambda b: b.skip(1)),
     Scenario("F60-slow", "30 ms", host(skipped=3), before=lambda b: b.skip(3), also=frozenset({"F60-late"})),

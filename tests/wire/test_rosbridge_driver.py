@@ -354,3 +354,25 @@ def test_it_can_be_opened_again(bridge: Bridge):
     for _ in range(2):
         with base:
             assert base.command(FORWARD) == FORWARD
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 30.0, -7.25])
+def test_the_offset_of_the_robot_s_clock_is_told_with_how_well_it_is_known(ahead_s):
+    with running_bridge({}, {"clock_skew_s": ahead_s}) as bridge:
+        base = Ridgeback(bridge.url, topics=TOPICS)
+        try:
+            offset = base.open().clock
+        finally:
+            base.close()
+    assert offset is not None
+    assert abs(offset.ahead_s - ahead_s) <= offset.within_s + 1e-6
+    assert 0.0 < offset.within_s < 0.1
+
+
+def test_without_rosapi_the_offset_of_the_clock_is_not_known():
+    with running_bridge({}, {"rosapi": False}) as bridge:
+        base = Ridgeback(bridge.url, topics=TOPICS)
+        try:
+            assert base.open().clock is None
+        finally:
+            base.close()

@@ -37,7 +37,7 @@ def measure_from_logs(rig: RigConfig, paths: Sequence[Path]) -> Estimate:
 
 def _ended(run: RunData) -> EndedPush:
     rig, ticks, name = run.rig, run.ticks, str(run.log)
-    if rig.control.controller != "force":
+    if rig.control.law != "force":
         raise UsageError("only pushes by force feedback settle", where=name, do="Leave it out")
     pushing = ticks["phase"] == float(Phase.PUSH)
     force = float(np.median(np.hypot(ticks["force_x"], ticks["force_y"])[pushing])) if pushing.any() else 0.0

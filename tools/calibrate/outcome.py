@@ -74,7 +74,7 @@ def lines(found: Estimate, path: Path, kept: Path | None, apply: Path | None) ->
     ]
     told += [f"by {found.source}", *found.told, f"written to {path}"]
     if kept is not None:
-        told.append(f"{apply} includes it now; as it was: {kept}")
+        told.append(f"{apply} includes it now; as it was: {kept.name}")
     elif found.keys:
         told.append(f'to use it, write include = ["{path}"] at the top of the rig, or add --apply RIG next time')
     return told

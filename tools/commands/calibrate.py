@@ -22,7 +22,8 @@ from tools.calibrate.places import (
 from tools.calibrate.session import Session, open_session
 from tools.places.apply_fragment import check_own
 from tools.rig import resolve_rig
-from tools.terminal.arguments import SEED, name_or_path, named_path, number
+from tools.terminal.arguments import SEED, named_path, number
+from tools.terminal.rig_arguments import add_rig
 
 DIRECTIONS = "0,120,240"
 
@@ -62,10 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
-    )
-    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
+    add_rig(parser)
     parser.add_argument("--out", type=named_path, metavar="FILE", help="where to write (calibration/WHAT-DATE.toml)")
     parser.add_argument("--apply", type=named_path, metavar="RIG", help="let this rig file include it; keeps RIG.bak")
     parser.add_argument("--rehearse", action="store_true", help="emulated only: a rehearsed person does what is asked")

@@ -15,23 +15,13 @@ from tools.doctor.examine import looked_at
 from tools.doctor.find import adapter_lines
 from tools.places.device_locks import FreeDevices
 from tools.rig import folder_of, resolve_rig
-from tools.terminal.arguments import name_or_path
+from tools.terminal.rig_arguments import add_faults, add_rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push doctor`."""
-    parser.add_argument(
-        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
-    )
-    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
-    parser.add_argument(
-        "--fault",
-        dest="faults",
-        action="append",
-        default=[],
-        metavar="WORDS",
-        help='what an emulated device does wrong: "ft.latency=16", "arm.protective-stop at 0 s"',
-    )
+    add_rig(parser)
+    add_faults(parser, 'what an emulated device does wrong: "ft.latency=16", "arm.protective-stop at 0 s"')
     parser.add_argument(
         "--prove-base-timeout",
         action="store_true",

@@ -4,8 +4,8 @@
 void run_lanes(const double *lanes, long count, double dt, long steps, long every, double *states, long records,
                double *finals, double *statistics) {
     for (long i = 0; i < count; i++) {
-        const double *p = lanes + 13 * i;
-        const int round = p[0] != 0.0, open_loop = p[12] != 0.0;
+        const double *p = lanes + 14 * i;
+        const int round = p[0] != 0.0, open_loop = p[12] != 0.0;  /* of the laws only these two */
         const double reach = p[1], half_width = p[2], d = p[3], mu = p[4];
         const double gain_f = p[8] + 1.0, k_y = p[9], speed = p[10], f_max = p[11];
         double x = 0.0, y = p[5], phi = p[6], s = p[7], fx = 1.0, fy = 0.0, v_x = 1.0, v_y = 0.0;

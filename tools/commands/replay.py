@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_io.error_report import printable, say_json, tell
-from robot_io.errors import ReplayDiffers
+from robot_io.errors import ReplayDiffers, UsageError
 from robot_io.log.log_format import FORMAT_FACT
 from tools.places.find_log import find_log
 from tools.replay import what_if_report
@@ -30,6 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--what-if", action="append", default=[], metavar="KEY=VALUE", help="re-run the same inputs with other settings"
     )
     parser.add_argument(
+        "--law", default="", metavar="MODULE:CLASS", help="the log's law, if it does not come with the program"
+    )
+    parser.add_argument(
         "--tolerance", type=number(0, 1e6), metavar="X", help="accept differences up to X (log from another machine)"
     )
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
@@ -40,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     path = find_log(args.log)
     if args.what_if:
         return answer_what_if(path, args)
-    result = replay(path, tolerance=args.tolerance)
+    result = replay(path, tolerance=args.tolerance, law=args.law)
     for line in lines(result):
         (tell if args.json else print)(printable(line))
     if args.json:
@@ -124,8 +127,11 @@ def machine_differences(facts: dict[str, str]) -> list[str]:
 
 
 def answer_what_if(path: Path, args: argparse.Namespace) -> int:
-    """Re-run the log's inputs with other settings and say what would differ."""
-    result = what_if(path, args.what_if)
+    """Re-run the log's inputs with other settings and say what would differ. Raises UsageError with --tolerance."""
+    if args.tolerance is not None:
+        what = "--tolerance is for comparing with the log, which --what-if does not do"
+        raise UsageError(what, where="push replay", do="Leave one of them out")
+    result = what_if(path, args.what_if, law=args.law)
     for line in what_if_report.lines(result):
         (tell if args.json else print)(printable(line))
     if args.json:

@@ -6,8 +6,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
+from control.laws.shipped import is_shipped
 from robot_io.error_report import SCHEMA, say_json, tell
-from robot_io.errors import EnvironmentFault, UsageError
+from robot_io.errors import EnvironmentFault, PushError, UsageError
+from robot_io.log.log_format import format_of
+from robot_io.mcap.log_file import CONFIG_ATTACHMENT, RUN_METADATA
+from robot_io.mcap.read import read_summary
+from robot_io.rig.logged import rig_of_log
+from tools.laws import query_law
+from tools.replay.law import check_given, other_source
 from tools.terminal.arguments import named_path
 
 if TYPE_CHECKING:
@@ -30,6 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gif", action="store_true", help="also write film.gif: the pushes from above, four times as fast"
     )
     parser.add_argument("--mp4", action="store_true", help="the same as film.mp4 (needs ffmpeg)")
+    parser.add_argument(
+        "--law",
+        action="append",
+        default=[],
+        metavar="MODULE:CLASS",
+        help="the law of a log, if it does not come with the program; once for each such law",
+    )
     parser.add_argument("--compare", type=named_path, help=argparse.SUPPRESS)
     parser.add_argument("--json", action="store_true", help="the paths written, as one line of JSON, last on stdout")
 
@@ -47,6 +63,8 @@ def run(args: argparse.Namespace) -> int:
 
         find_ffmpeg()
     logs = logs_of(args.log)
+    for log in logs:
+        check_law(log, args.law)
     written = write_page(logs[0], args) if len(logs) == 1 else compare(logs, args)
     for path in written:
         tell(f"wrote {path}")
@@ -54,6 +72,27 @@ def run(args: argparse.Namespace) -> int:
         paths = [str(path) for path in written]
         say_json({"schema": SCHEMA, "logs": [str(log) for log in logs], "report": paths[0], "files": paths})
     return 0
+
+
+def check_law(log: Path, given: list[str]) -> None:
+    """Check that the law of a log that is not a shipped one is given, and tell if its source was another one.
+
+    Raises EnvironmentFault if it is not given, ConfigError if it cannot be used.
+    """
+    summary = read_summary(log)
+    facts = summary.metadata.get(RUN_METADATA, {})
+    try:
+        config = summary.attachments.get(CONFIG_ATTACHMENT, b"").decode()
+        control = rig_of_log(config, format_of(facts, str(log))).rig.control
+    except (PushError, UnicodeDecodeError):
+        return  # reading it will say what is wrong
+    if is_shipped(control.law):
+        return
+    law = control.law if control.law in given else (given[-1] if given else "")
+    check_given(log, control.law, law)
+    today = query_law(replace(control, law=law), str(Path.cwd())).facts.source_sha256
+    if words := other_source(facts, today):
+        tell(f"note: {log}: made by other code ({words})")
 
 
 def write_page(log: Path, args: argparse.Namespace) -> list[Path]:

@@ -13,8 +13,10 @@ from robot_io.error_report import ignoring_output_errors, say_json, tell
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
-from tools.commands.run_outputs import save_tare, write_report, write_summary
+from tools.commands.run_laws import add_law_arguments, check_law, law_overrides, note_passed_law
+from tools.commands.run_outputs import save_tare, unused_faults, with_injected, write_report, write_summary
 from tools.commands.run_trials import check_trials, run_battery
+from tools.laws import own_law
 from tools.live.arguments import add_live_arguments
 from tools.live.view import check_live, live_view
 from tools.places import run_dir, saved_tare
@@ -28,9 +30,10 @@ from tools.run.facts.bounds import bounds_of, check_room
 from tools.run.facts.outlook import blind_words, tell_bounds, tell_levels
 from tools.run.facts.run_facts import level_of
 from tools.terminal import verdict
-from tools.terminal.arguments import SEED, name_or_path, named_path, note, number, whole_number
+from tools.terminal.arguments import SEED, named_path, note, number, whole_number
 from tools.terminal.gain_warning import gain_warning
 from tools.terminal.live_line import LiveLine
+from tools.terminal.rig_arguments import add_faults, add_rig
 from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
@@ -38,28 +41,16 @@ from tools.verdict.witness import Witness
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push run`."""
-    parser.add_argument(
-        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
-    )
+    add_rig(parser)
     parser.add_argument(
         "--distance-m", type=number(0.001, 1000), metavar="M", help="how far to push, from first contact"
     )
-    parser.add_argument(
-        "--controller", choices=("force", "open-loop"), help="force (the pushing law) or open-loop (straight ahead)"
-    )
+    add_law_arguments(parser)
     parser.add_argument("--seed", type=SEED, metavar="SEED", default=0, help="seed of the simulated world (0)")
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the run, created (default: runs/RIG-TIME)"
     )
-    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
-    parser.add_argument(
-        "--fault",
-        dest="faults",
-        action="append",
-        default=[],
-        metavar="WORDS",
-        help='inject a fault, at levels sim and emulated: "ft.frozen at 10 s for 1 s"',
-    )
+    add_faults(parser, 'inject a fault, at levels sim and emulated: "ft.frozen at 10 s for 1 s"')
     parser.add_argument("--fast", action="store_true", help="level sim only: as fast as possible")
     parser.add_argument(
         "--start-in-contact", action="store_true", help="use a tare saved in this power cycle of the sensor"
@@ -163,8 +154,7 @@ def overrides(args: argparse.Namespace) -> list[str]:
     found = list(args.overrides)
     if args.distance_m is not None:
         found.append(f"control.distance_m={args.distance_m!r}")
-    if args.controller is not None:
-        found.append(f"control.controller={args.controller}")
+    found += law_overrides(args)
     if args.start_in_contact:
         found.append("world.start.gap_m=0.0")
     return found
@@ -179,6 +169,8 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
             where="push run",
             do="Clear the floor, hold the e-stop, and add --move-robot",
         )
+    if hardware and args.move_robot and not args.untested_law:
+        check_law(rig)
     blind = blind_words(rig)
     if blind and not (args.drive_blind or args.check):
         raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
@@ -241,6 +233,7 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         witness=launcher.witness(figures),
         pushed=launcher.pushed(),
     )
+    note_passed_law(rig, summary)
     return with_injected(summary, launcher.injected(figures)) | {"latency": launcher.latencies()}
 
 
@@ -257,10 +250,11 @@ def lockstep_summary(
     from tools.run.lockstep import Lockstep, open_log
     from tools.run.paced import PacedRun, run_fast
 
+    law = own_law(rig.control, folder_of(args.rig))
     text = run_dir.write_config(out, rig)
     log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
     try:
-        one = Lockstep(rig, args.seed, log, saved=saved)
+        one = Lockstep(rig, args.seed, log, saved=saved, law=law)
     except PushError:  # an impossible world: nothing has started
         log.abandon()
         run_dir.discard(out)
@@ -293,13 +287,3 @@ def lockstep_summary(
         pushed=object_pose(rig.path, log.object_poses),
     )
     return with_injected(summary, figures["injected"]) | {"latency": msgspec.to_builtins(log.latencies)}
-
-
-def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
-    """Return the summary and, if faults were injected, how many samples each has changed."""
-    return summary | {"injected": counts} if counts else summary
-
-
-def unused_faults(summary: dict[str, Any]) -> list[str]:
-    """Return the faults to inject that changed nothing."""
-    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]

@@ -42,3 +42,13 @@ def write_report(summary: dict[str, Any], out: Path, ready: ReportProcess | None
         tell(f"no report: {reason}; `push report {out}` makes one from the log")
     else:
         summary["report"] = str(out / "report.html")
+
+
+def with_injected(summary: dict[str, Any], counts: dict[str, int]) -> dict[str, Any]:
+    """Return the summary and, if faults were injected, how many samples each has changed."""
+    return summary | {"injected": counts} if counts else summary
+
+
+def unused_faults(summary: dict[str, Any]) -> list[str]:
+    """Return the faults to inject that changed nothing."""
+    return [words for words, changed in summary.get("injected", {}).items() if changed == 0]

@@ -56,7 +56,7 @@ def run_battery(
         run_dir.discard(out)
         raise
     with ignoring_output_errors():
-        for line in (*table(trials), f"table: {out / TABLE}"):
+        for line in (*table(trials), f"table: {out / TABLE}; `push report {out}` draws the trials on one page"):
             tell(line) if args.json else print(line)
         if args.json:
             say_json({**msgspec.to_builtins(trials), "out": str(out)})

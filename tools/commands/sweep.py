@@ -14,7 +14,7 @@ from typing import Any
 from robot_io.error_report import say_json, tell
 from robot_io.errors import OperatorStop, UsageError
 from tools.study.engine import default_workers, engine, run_items
-from tools.study.grid import load_grid
+from tools.study.grid import check_law, load_grid
 from tools.study.paper import paper_study
 from tools.study.plan import Plan, hardware_plan, lanes_plan
 from tools.terminal.arguments import name_or_path, named_path, number, pair, whole_number
@@ -35,7 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="K_F,K_Y",
         help="gains for all cases, for example --gains=0.1,0.3",
     )
-    parser.add_argument("--open-loop", action="store_true", help="push straight along the path in all cases")
+    parser.add_argument("--law", metavar="LAW", help="the law of all cases, one of the shipped ones")
+    parser.add_argument("--open-loop", action="store_true", help="the same as --law open-loop")
     parser.add_argument("--dt", type=number(1e-6, 100), metavar="S", help="simulation step in s")
     parser.add_argument(
         "--workers", type=whole_number(1, 10_000), metavar="N", help="worker processes (default: one per core)"
@@ -90,10 +91,13 @@ def run(args: argparse.Namespace) -> int:
 def _plan(args: argparse.Namespace) -> Plan:
     gains = args.gains
     if args.grid == "hardware":
-        return hardware_plan(gains, args.dt, args.open_loop)
+        return hardware_plan(gains, args.dt, bool(args.open_loop or args.law))
     changes: dict[str, Any] = {"k_f": gains[0], "k_y_rad_per_m": gains[1]} if gains else {}
-    if args.open_loop:
-        changes["controller"] = "open-loop"
+    if args.open_loop and args.law not in (None, "open-loop"):
+        raise UsageError("--open-loop and --law name two laws", where="push sweep", do="Give one of them")
+    if law := "open-loop" if args.open_loop else args.law:
+        check_law(law, "--law")
+        changes["law"] = law
     if args.grid == "paper":
         return lanes_plan(paper_study(changes, args.dt))
     return lanes_plan(load_grid(Path(args.grid), changes, args.dt))

@@ -9,11 +9,11 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+from control.laws.shipped import is_shipped
 from robot_io.error_report import say_json, tell
 from robot_io.errors import UsageError
 from sim_backend.physics.assumed_sliders import pushed_body, samples
@@ -21,17 +21,17 @@ from sim_backend.physics.floor import FloorEffects
 from sim_backend.physics.gain_limits import (
     PushedBody,
     fast_loop_k_f,
-    frictionless_limit,
+    integral_limit,
     limit,
     offset_per_degree_m,
     offset_per_newton_m,
-    sticking_limit,
 )
 from sim_backend.physics.slider import Circle, Pressure, Rectangle
 from tools.study.tune_map import PRESETS
 from tools.terminal.arguments import named_path, number, pair
 
 Choice = TypeVar("Choice", bound=str)
+TUNED = ("force", "force-integral")
 SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
 PRESSURES: tuple[Pressure, ...] = ("uniform", "rim", "point")
 MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
@@ -47,6 +47,7 @@ MAX_K_F_SHARE = 0.5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
+    parser.add_argument("--law", default="force", metavar="LAW", help="force (default) or force-integral")
     parser.add_argument("--shapes", default="box,circle", help="box, circle or both (default: box,circle)")
     parser.add_argument(
         "--size-m", type=LENGTHS_M, default="0.3,0.7", metavar="LOW,HIGH", help="length along the push, or diameter"
@@ -86,6 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Find gains and print them; return the exit code. Raises UsageError."""
+    check_law(args.law)
     bodies = assumed_bodies(args)
     fast = fast_loop_k_f(bodies)
     k_f = args.k_f if args.k_f <= MAX_K_F_SHARE * fast else _rounded_down(max(MAX_K_F_SHARE * fast, 1e-9))
@@ -97,11 +99,18 @@ def run(args: argparse.Namespace) -> int:
         )
     k_y = _rounded_down(SHARE * highest)
     out = _folder(args.out)
+    from tools.study.limit_checks import check_integral_limits, check_limits
+
     checks = [] if args.no_check else check_limits(bodies, k_f)
+    integral = _integral(bodies, k_f, k_y) if args.law == "force-integral" else None
+    if integral and not args.no_check:
+        checks += check_integral_limits(bodies, k_f, k_y)
     size = "{:g} to {:g} m".format(*args.size_m)
     what = f"{args.shapes} of {size}, pressure {args.pressures}, ball {args.ball_radius_m:g} m"
     files = _draw(bodies, (k_f, k_y), what, out)
     result: dict[str, Any] = {
+        "law": args.law,
+        "integral": integral,
         "assumed": len(bodies),
         "recommended": {"k_f": k_f, "k_y_rad_per_m": k_y},
         "limit_k_y_rad_per_m": highest,
@@ -132,6 +141,25 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def check_law(law: str) -> None:
+    """Raise UsageError for a law whose gains have no limits in closed form."""
+    if law in TUNED:
+        return
+    if is_shipped(law):
+        raise UsageError(f"the law `{law}` does not feel the force: no gain of it keeps an object", where="--law")
+    raise UsageError(
+        f"`push tune` has limits for {' and '.join(TUNED)} only, not for `{law}`",
+        where="--law",
+        do="Use push study, which runs any law",
+    )
+
+
+def _integral(bodies: Sequence[PushedBody], k_f: float, k_y: float) -> dict[str, float]:
+    """Return a gain of the integral beside these gains, and its limit."""
+    highest = integral_limit(bodies, k_f, k_y)
+    return {"k_i_rad_per_m2": _rounded_down(SHARE * highest), "limit_k_i_rad_per_m2": highest}
+
+
 def assumed_bodies(args: argparse.Namespace) -> list[PushedBody]:
     """Return the sliders the arguments assume: the ends of their ranges and some between. Raises UsageError."""
     lengths = samples(*args.size_m)
@@ -155,38 +183,6 @@ def assumed_bodies(args: argparse.Namespace) -> list[PushedBody]:
     return bodies
 
 
-def check_limits(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
-    """Simulate the limiting slider of each formula; return both limits and their relative difference."""
-    from tools.study.gain_check import simulated_limit
-
-    formulas: dict[str, Callable[[PushedBody, float], float]] = {
-        "sticking": sticking_limit,
-        "frictionless": frictionless_limit,
-    }
-    found = []
-    for shape, chosen in (("box", [b for b in bodies if not b.round]), ("circle", [b for b in bodies if b.round])):
-        for contact, formula in formulas.items() if chosen else ():
-            body = min(chosen, key=partial(_limit_at, formula, k_f))
-            expected = formula(body, k_f)
-            simulated = simulated_limit(body, k_f, frictionless=contact == "frictionless", near=expected)
-            found.append(
-                {
-                    "shape": shape,
-                    "contact": contact,
-                    "rho_m": body.rho_m,
-                    "d_m": body.d_m,
-                    "closed_form_k_y": expected,
-                    "simulated_k_y": simulated,
-                    "difference": simulated / expected - 1,
-                }
-            )
-    return found
-
-
-def _limit_at(formula: Callable[[PushedBody, float], float], k_f: float, body: PushedBody) -> float:
-    return formula(body, k_f)
-
-
 def _print_result(result: dict[str, Any], args: argparse.Namespace) -> None:
     best = result["recommended"]
     tell(
@@ -194,6 +190,11 @@ def _print_result(result: dict[str, Any], args: argparse.Namespace) -> None:
         f"{result['margin']:.2g} to the limit {result['limit_k_y_rad_per_m']:.3g} rad/m over {result['assumed']} "
         "assumed sliders"
     )
+    if result["integral"]:
+        tell(
+            "  with these the integral's k_i {k_i_rad_per_m2:.2g} rad/m^2, half of its limit "
+            "{limit_k_i_rad_per_m2:.2g}; it takes the steady offset away".format(**result["integral"])
+        )
     if best["k_f"] < args.k_f:
         tell(
             f"  k_f {args.k_f:g} is not used: beyond {result['fast_loop_k_f']:.3g} the force's direction is unstable "
@@ -208,9 +209,10 @@ def _print_result(result: dict[str, Any], args: argparse.Namespace) -> None:
         margin = "no k_y is stable at this k_f" if share is None else f"{share:.2f} of the limit"
         tell(f"  {preset['name']} {preset['k_f']:g}/{preset['k_y_rad_per_m']:g}: {margin}")
     for entry in result["checks"]:
+        gain = "k_y" if "simulated_k_y" in entry else "k_i"
         tell(
-            f"  simulated: {entry['shape']} {entry['contact']}, limit {entry['simulated_k_y']:.4g} "
-            f"(closed form {entry['closed_form_k_y']:.4g}, {100 * entry['difference']:+.2f} %)"
+            f"  simulated: {entry['shape']} {entry['contact']}, limit {entry[f'simulated_{gain}']:.4g} "
+            f"(closed form {entry[f'closed_form_{gain}']:.4g}, {100 * entry['difference']:+.2f} %)"
         )
     tell(f"map in {result['out']}: {', '.join(result['files'])}")
 

@@ -13,7 +13,7 @@ from tools.live.view import check_live, live_view
 from tools.places.device_locks import FreeDevices
 from tools.places.running import RunningRun
 from tools.rig import devices_at, folder_of, resolve_rig
-from tools.terminal.arguments import name_or_path
+from tools.terminal.rig_arguments import add_rig
 from tools.watch.find_run import run_to_watch
 from tools.watch.seen import DEVICES, Seen
 from tools.watch.show import Show
@@ -21,10 +21,7 @@ from tools.watch.show import Show
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `push watch`."""
-    parser.add_argument(
-        "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
-    )
-    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
+    add_rig(parser)
     add_live_arguments(parser)
     parser.add_argument("--json", action="store_true", help="a line of JSON five times a second")
 

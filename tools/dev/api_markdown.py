@@ -138,7 +138,8 @@ def _annotations(member: type[Any]) -> Iterator[tuple[str, str]]:
     for name, kind in inspect.get_annotations(member).items():
         if not name.startswith("_"):
             text = kind.__forward_arg__ if isinstance(kind, ForwardRef) else str(kind)  # a NamedTuple wraps its types
-            yield name, re.sub(r"^ClassVar\[(.*)\]$", r"\1", text)
+            text = re.sub(r"^ClassVar\[(.*)\]$", r"\1", text)
+            yield name, re.sub(r"^Annotated\[(\w+), '.*\]$", r"\1", text.replace('"', "'"))  # its width in a log
     for name, kind, _ in _attributes(member):
         yield name, kind
 

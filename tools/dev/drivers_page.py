@@ -82,7 +82,8 @@ PARTS = (
         "robot_io.messages",
         (
             *("Stamped", "SensorWrench", "JointState", "Joints", "ArmState", "ArmRecord", "ArmError"),
-            *("BaseFeed", "BasePose", "BaseOdometry", "BaseReport", "BaseStatus", "SliderPose", "CommandEcho"),
+            *("BaseFeed", "BasePose", "BaseOdometry", "OdometryPose", "BaseReport", "BaseStatus"),
+            *("SliderPose", "CommandEcho", "ClockOffset"),
             *("BaseRecord", "BodyTwist", "WorldTwist", "Pose2D", "DeviceInfo", "DeviceHealth", "LinkState"),
         ),
         "robot_io.messages",

@@ -75,7 +75,8 @@ def reference() -> str:
             note = notes.get((table.__name__, field.name), "").replace("\n", " ").replace("|", "\\|")
             parts.append(f"| `{field.name}` | {_type_text(hints[field.name])} | {_default(field)} | {note} |")
     parts.append(RENAMES)
-    parts += [f"- {advice(key)}." for key in (*(one.old for one in RENAMED), *(one.key for one in RETIRED))]
+    parts += [f"- {advice(one.old)}{', and still read' if one.still_read else ''}." for one in RENAMED]
+    parts += [f"- {advice(one.key)}." for one in RETIRED]
     return "\n".join(parts) + "\n"
 
 
@@ -87,7 +88,7 @@ def _tables(table: type[msgspec.Struct], prefix: str) -> list[tuple[str, type[ms
         below = table_of(hints[field.name])
         if below and below is found[-1][1]:  # one text for several tables of a kind
             found[-1] = (f"{found[-1][0]}], [{name}", below)
-        elif below and field.name != "declared":  # written by the program
+        elif below and field.name not in ("declared", "law_facts"):  # written by the program
             found += _tables(below, name)
         if row := row_of(hints[field.name]):
             found.append((f"[{name}]", row))

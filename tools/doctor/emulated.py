@@ -28,7 +28,7 @@ from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.world.world import World
 from tools.kinds import is_shipped
 from tools.rig import devices_at, kinds_of, with_addresses
-from tools.run.emulators import Emulator, address_of, open_emulator
+from tools.run.emulators import Emulator, addresses_of, open_emulators
 from tools.run.hands import Hands
 
 READY_WITHIN_S = 20.0
@@ -109,20 +109,17 @@ def main() -> int:
     status = StatusPipe(job.status_fd)
     rig = rig_from_toml(job.rig_toml)
     loop = EventLoop()
-    opened: dict[str, Emulator] = {}
     try:
         world = World(rig, 0, monotonic_ns())
-        for device in job.devices:
-            opened[device] = open_emulator(loop, world, rig, device, job.kind_folder)
+        opened = open_emulators(loop, world, rig, job.devices, job.kind_folder)
     except PushError as error:
         status.error(error)
         return error.exit_code
-    addresses = {device: address_of(emulator) for device, emulator in opened.items()}
     spoil(loop, opened, job.faults, rig)
     if job.hands_fd >= 0:
         Hands(loop, job.hands_fd, world, lambda words: print(words, file=sys.stderr))
     try_realtime(PRIORITY)
-    status.say("ready", addresses=addresses)
+    status.say("ready", addresses=addresses_of(opened))
     loop.run()  # SIGTERM ends the process: its ports and sockets go with it
     return 0
 

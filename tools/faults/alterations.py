@@ -106,12 +106,6 @@ def bounded(**bounds: float) -> Callable[[TickCore], TickCore]:
     return lambda core: replace(core, safety=replace(core.safety, phases=replace(core.safety.phases, **bounds)))
 
 
-def without_law(core: TickCore) -> TickCore:
-    """Return a core whose law gives no number, as by a defect."""
-    control = replace(core.control.control, k_f=math.nan)
-    return replace(core, control=replace(core.control, control=control))
-
-
 def too_fast(core: TickCore) -> TickCore:
     """Return a core whose approach is faster than the envelope, as by a defect."""
     control = replace(core.control.control, approach_speed_m_per_s=0.2)

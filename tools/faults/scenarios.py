@@ -10,11 +10,12 @@ import math
 from robot_io.geometry import point_outside
 from robot_io.tick import Phase, TickInput, TickState
 from tools.faults import alterations as do
+from tools.faults.bad_laws import BadLaw, Forgetful, Raising, steered_by
 from tools.faults.scenario import Moment, Scenario
 
 START, APPROACH, RETREAT, END = Moment.START, Moment.APPROACH, Moment.RETREAT, Moment.END
 CALM = (
-    'control.controller="open-loop"',
+    'control.law="open-loop"',
     *("world.odometry_noise_m_per_s=0.0", "world.mocap_noise_m=0.0", "world.mocap_noise_deg=0.0"),
 )
 """A base that neither moves aside by itself nor seems to, so that it is the fault that brings it near an edge."""
@@ -191,7 +192,10 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F55-slow", "drifts aside", ("base.odometry.wrong=0,0.04",), edge_beside_m=0.018, settings=CALM),
     Scenario("F55-stop", "drifts aside", ("base.odometry.wrong=0,0.08",), edge_beside_m=0.018, settings=CALM),
     Scenario("F56", "it pushes from the side", alter=do.pushed_aside(75.0, 15.0), begins=backward),
-    Scenario("F58", "a defect in the law", core=do.without_law),
+    Scenario("F57", "the law raises an exception", core=steered_by(Raising())),
+    Scenario("F57", "its state is of another type", core=steered_by(Forgetful())),
+    Scenario("F57-slow", "a step takes 2 ms", alter=do.host(law_ns=2_000_000)),
+    Scenario("F58", "a defect in the law", core=steered_by(BadLaw())),
     Scenario("F59", "turned by 25 degrees", ("base.pose.turned=25",), START, begins=two_cm_on),
     Scenario("F60-late", "one tick skipped", alter=do.host_once(1, skipped=1)),
     Scenario("F60-slow", "30 ms", alter=do.host_once(1, skipped=3)),

@@ -30,7 +30,7 @@ def check_live(port: int, *, fast: bool = False) -> None:
     if fast:
         raise UsageError("--live shows a run at the pace of the clock, and --fast does not keep it", where="push run")
     if importlib.util.find_spec("foxglove") is None:
-        raise EnvironmentFault("--live needs foxglove-sdk, which is not installed", where="push", do=EXTRA)
+        raise EnvironmentFault("--live needs foxglove-sdk, which is not installed", do=EXTRA)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -67,7 +67,8 @@ class SignalsOf:
         )
         phase = control.phase
         contact = _CONTACT.get(phase, Contact.NONE)
-        numbers = map(_float32, values)
+        # A NaN is no sum either: then each is looked at.
+        numbers = values if sum(map(abs, values)) < _LARGEST else tuple(map(_float32, values))
         fields: tuple[Any, ...] = (header, *numbers, phase, out.mode, int(contact), strongest(out.faults))
         return Signals(*fields)
 

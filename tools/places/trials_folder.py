@@ -8,7 +8,6 @@ from pathlib import Path
 
 import msgspec
 
-from robot_io.errors import UsageError
 from tools.places.atomic_file import write_atomically, write_json
 
 TRIALS = "trials.json"
@@ -60,19 +59,3 @@ def write_trials(folder: Path, trials: Trials) -> None:
     rows.writerow(Trial.__struct_fields__)
     rows.writerows(msgspec.structs.astuple(trial) for trial in trials.trials)
     write_atomically(folder / TABLE, table.getvalue().encode())
-
-
-def read_trials(folder: Path) -> Trials:
-    """Read a battery's `trials.json`. Raises UsageError if there is none that can be read."""
-    try:
-        return msgspec.json.decode((folder / TRIALS).read_bytes(), type=Trials)
-    except OSError as error:
-        raise UsageError(f"{TRIALS} cannot be read: {error.strerror}", where=str(folder)) from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{TRIALS} is not one of ours: {error}", where=str(folder)) from None
-
-
-def trial_folders(folder: Path) -> list[Path]:
-    """Return the folders of a battery's trials that have a log, in their order. Raises UsageError: no battery."""
-    found = [folder / Path(trial.folder).name for trial in read_trials(folder).trials]
-    return [path for path in found if (path / "run.mcap").exists()]

@@ -20,6 +20,7 @@ from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplay, BaseInputsR
 from tools.replay.code_origin import CodeOrigin
 from tools.replay.derived import DerivedReplay, DerivedReplayer
 from tools.replay.difference import Difference, difference
+from tools.replay.law import law_of, with_law_source
 from tools.replay.verified_log import VerifiedLog
 from tools.replay.world import PREFIX, WorldReplay, WorldReplayer, WorldTypes
 from tools.run.facts.run_facts import level_of
@@ -49,15 +50,17 @@ class ReplayResult(msgspec.Struct, frozen=True):
         return self.first_difference is not None or any(part and part.first_difference for part in parts)
 
 
-def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
-    """Replay a log.
+def replay(path: Path, *, tolerance: float | None = None, law: str = "") -> ReplayResult:
+    """Replay a log. law: `module:Class` of its law where that is not a shipped one.
 
     Raises UsageError if there is no such log, LogDamaged if it cannot be trusted, ReplayDiffers if only the code that
-    wrote it can use its config.
+    wrote it can use its config, and as `law_of`.
     """
     log = VerifiedLog(path)
     rig = log.usable_rig()
-    ticks = TickReplayer(TickCore.of(rig, in_contact=log.in_contact), tolerance, log.ticks)
+    own, sha256 = law_of(path, rig.control, law)
+    made_by = with_law_source(log.made_by, log.facts, sha256)
+    ticks = TickReplayer(TickCore.of(rig, in_contact=log.in_contact, law=own), tolerance, log.ticks)
     types = WorldTypes(
         log.type_of("/world/start", START_CDR),
         log.type_of("/world/command", COMMAND_CDR),
@@ -101,7 +104,7 @@ def replay(path: Path, *, tolerance: float | None = None) -> ReplayResult:
             *_world_notes(world, world_replay, types, level_of(rig)),
             *_derived_notes(derived_replay),
         ),
-        log.made_by,
+        made_by,
         log.facts,
     )
     if not result.different:  # a difference tells more than a changed config

@@ -16,6 +16,7 @@ from robot_io.errors import ConfigError
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, Phase
 from safety import limits
+from tools.replay.law import core_maker
 from tools.replay.verified_log import VerifiedLog
 from tools.replay.what_if_keys import other_rig
 from tools.replay.what_if_sides import PARTS, Change, End, OtherFault, Part, PartResult, Side, parts_of
@@ -142,18 +143,18 @@ class WhatIf:
             self._first = self._first or First(number, at_s, phase, different)
 
 
-def what_if(path: Path, settings: Sequence[str]) -> WhatIfResult:
+def what_if(path: Path, settings: Sequence[str], *, law: str = "") -> WhatIfResult:
     """Run the ticks of a log with `key=value` settings laid over its rig.
 
     Raises UsageError for keys that cannot change a replay, ConfigError for values that no rig can have, and as
-    `VerifiedLog` for the log.
+    `VerifiedLog` for the log. law: `module:Class` of its law where that is not a shipped one; raises as `law_of`.
     """
     log = VerifiedLog(path)
     log.require_config()
     rig = log.usable_rig()
-    other = other_rig(rig, settings, in_contact=log.in_contact)
-    own_core, other_core = (TickCore.of(one, in_contact=log.in_contact) for one in (rig, other))
-    found = WhatIf(own_core, other_core)
+    core_of = core_maker(path, rig.control, law, in_contact=log.in_contact)
+    other = other_rig(rig, settings, core_of)
+    found = WhatIf(core_of(rig), core_of(other))
     for _, _, _, tick in log.messages():
         if tick is not None:
             found.take(tick)

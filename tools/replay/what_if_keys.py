@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 
@@ -30,25 +30,26 @@ FIXED = {
     "base.options": _DEVICES,
     "base.pose_source": "the log's poses come from where they came from then",
     "base.topics": _DEVICES,
+    "control.law_facts": "it is what the law of then said of itself",
     "frames.base_from_marker": "the log's poses are already those of the base",
 }
 """Keys and tables that say where a log's measurements came from, with the reason; a tick may read them all the same."""
 _UNREAD = "it changes no setting of the law or the safety checks"
 
 
-def other_rig(rig: RigConfig, settings: Sequence[str], *, in_contact: bool) -> RigConfig:
-    """Return the rig of a log with `key=value` settings laid over it.
+def other_rig(rig: RigConfig, settings: Sequence[str], core_of: Callable[[RigConfig], TickCore]) -> RigConfig:
+    """Return the rig of a log with `key=value` settings laid over it; `core_of` makes the core of a rig.
 
     Raises UsageError for keys that cannot change a replay, and as `rig_from_toml` for the settings themselves.
     """
     text = rig_to_toml(rig)
     other = rig_from_toml(text, overrides=settings, option=OPTION)
-    core = TickCore.of(other, in_contact=in_contact)
+    core = core_of(other)
     reasons = []
     for setting in settings:
         key = ".".join(parse_setting(setting, OPTION)[0])
         rest = [one for one in settings if one is not setting]
-        reason = _fixed(key) or _unread(text, rest, other, core)
+        reason = _fixed(key) or _unread(text, rest, other, core, core_of)
         if reason:
             reasons.append(f"`{key}` cannot change a replay: {reason}")
     if reasons:
@@ -62,12 +63,14 @@ def _fixed(key: str) -> str:
     return next((reason for name, reason in FIXED.items() if f"{key}.".startswith(f"{name}.")), "")
 
 
-def _unread(text: str, rest: Sequence[str], other: RigConfig, core: TickCore) -> str:
+def _unread(
+    text: str, rest: Sequence[str], other: RigConfig, core: TickCore, core_of: Callable[[RigConfig], TickCore]
+) -> str:
     """Return why the setting missing in `rest` has no effect on a tick, "" if it has one or repeats the log's value."""
     try:
         without = rig_from_toml(text, overrides=rest, option=OPTION)
         same = msgspec.to_builtins(without) == msgspec.to_builtins(other)
-        if same or TickCore.of(without, in_contact=core.control.in_contact) != core:
+        if same or core_of(without) != core:
             return ""
     except ConfigError:  # the others need it
         return ""

@@ -18,6 +18,7 @@ from typing import Any
 from robot_io.errors import EnvironmentFault, PushError, UsageError
 from robot_io.mcap.walk import Grown
 from safety.faults import FAULTS
+from tools.laws import law_label
 from tools.places.atomic_file import write_atomically
 from tools.report import run_facts, run_summary, run_verdict
 from tools.report.advice.what_to_try import what_to_try
@@ -112,7 +113,7 @@ def page(run: RunData, summary: dict[str, Any], svgs: dict[str, str], mark: str)
     """Return the page. Everything that comes from the log or the summary is escaped."""
     verdict = run_verdict.verdict(run, summary)
     rig = run.rig
-    subtitle = [run_facts.level_words(run), run_facts.law_name(rig), f"seed {run.facts.get('seed', '-')}", run.log.name]
+    subtitle = [run_facts.level_words(run), law_label(rig), f"seed {run.facts.get('seed', '-')}", run.log.name]
     baseline = run_summary.baseline_of(rig)
     advice = items(what_to_try(run, verdict))
     script = SCRIPT.read_text(encoding="utf-8")

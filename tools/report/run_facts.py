@@ -7,15 +7,8 @@ from typing import Any
 
 from robot_io.clock import NS_PER_S
 from robot_io.rig.config import RigConfig
+from tools.laws import law_label
 from tools.report.run_data import RunData
-
-LAWS = {"force": "force feedback", "open-loop": "open loop, straight ahead"}
-"""Laws that have a name in words; all others are called by their own."""
-
-
-def law_name(rig: RigConfig) -> str:
-    """Return the name of a rig's law in words."""
-    return LAWS.get(rig.control.controller, rig.control.controller)
 
 
 def level_words(run: RunData) -> str:
@@ -32,13 +25,13 @@ def note_of(run: RunData, summary: dict[str, Any]) -> str:
 def reader_facts(run: RunData, summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Return (what, value) in the order in which a reader asks."""
     control, facts = run.rig.control, run.facts
-    gains = "" if control.controller == "open-loop" else f", k_f {control.k_f:g}, k_y {control.k_y_rad_per_m:g} rad/m"
+    gains = "" if control.law == "open-loop" else f", k_f {control.k_f:g}, k_y {control.k_y_rad_per_m:g} rad/m"
     changed = ", with uncommitted changes" if facts.get("dirty") == "True" else ""
     rows = [
         ("when", _when(run)),
         ("note", note_of(run, summary)),
         ("rig", level_words(run)),
-        ("law", f"{law_name(run.rig)}{gains}"),
+        ("law", f"{law_label(run.rig)}{gains}"),
         ("push", f"{control.distance_m:g} m at {control.push_speed_m_per_s:g} m/s"),
         ("object", object_words(run.rig)),
         ("seed", facts.get("seed", "")),

@@ -21,11 +21,14 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
 from robot_io.messages import ArmRecord, ArmState, JointState, LinkState
 from robot_io.rig.config import rig_from_toml
+from robot_io.tick import link_number
 from tools.run.jobs import ArmKindJob
 
 PRIORITY = 81
 PERIOD_NS = 4 * NS_PER_MS
 """How often the driver is drained and a record is published."""
+MOST_STATE = 255
+"""The largest that a record holds; a driver that says anything else says nothing."""
 
 
 def main() -> int:
@@ -72,14 +75,17 @@ def main() -> int:
 
 def publish(driver: Driver[JointState], record: TypedRecord[ArmRecord], before: ArmRecord, *, servo: bool) -> ArmRecord:
     """Publish the driver's newest state, even if it has not changed; return it."""
-    samples, link, now_ns = driver.drain(), driver.health().state, monotonic_ns()
+    samples, link, now_ns = driver.drain(), link_number(driver.health().state), monotonic_ns()
     newest = before
     if samples:
         sample = samples[-1]
         arrived = min(sample.received_ns, now_ns)  # a time stamp in the future would never get old
-        newest = msgspec.structs.replace(before, joints=sample.value, packets=sample.seq, changed_ns=arrived)
+        joints = sample.value
+        if not 0 <= joints.state <= MOST_STATE:
+            joints = msgspec.structs.replace(joints, state=int(ArmState.UNKNOWN))
+        newest = msgspec.structs.replace(before, joints=joints, packets=sample.seq, changed_ns=arrived)
     holds = servo and link == LinkState.UP and newest.joints.state == ArmState.HOLDING
-    newest = msgspec.structs.replace(newest, link=int(link), servo=holds, published_ns=now_ns)
+    newest = msgspec.structs.replace(newest, link=link, servo=holds, published_ns=now_ns)
     record.publish(newest)
     return newest
 

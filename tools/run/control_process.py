@@ -13,6 +13,7 @@ import time
 
 import msgspec
 
+from control.laws.law import Law
 from control.loop import ControlLoop, Watch
 from control.notes.run_notes import outcome
 from robot_io.clock import NS_PER_S, monotonic_ns
@@ -32,7 +33,9 @@ from sim_backend.injection.event import event_writer
 from sim_backend.injection.injection import Injection
 from sim_backend.injection.sensor import InjectedSensor
 from tools.kinds import name_of
+from tools.laws import own_law
 from tools.run.jobs import ControlJob
+from tools.run.law_clock import LawClock
 from tools.run.run_state import initial_state, status_line
 from tools.run.tick_core import TickCore
 
@@ -75,9 +78,14 @@ def main() -> int:
         return error.exit_code
     ring = Ring(job.ring_fd)
     injection = Injection(rig.faults.inject, monotonic_ns, event_writer(ring.push, job.wall_offset_ns))
+    try:
+        law = own_law(rig.control, job.kind_folder)
+    except PushError as error:
+        status.error(error)
+        return error.exit_code
     base = GateLink(socket.socket(fileno=job.gate_fd), job.base_record_fd)
     deadman = Deadman(FROZEN_S)
-    loop = _loop(job, rig, sensor, base, ring, injection, status, deadman)
+    loop = _loop(job, rig, law, sensor, base, ring, injection, status, deadman)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     try:
         info = started(sensor, "ft", rig.ft.kind)
@@ -110,6 +118,7 @@ def main() -> int:
 def _loop(
     job: ControlJob,
     rig: RigConfig,
+    law: Law | None,
     sensor: Sensor,
     base: GateLink,
     ring: Ring,
@@ -118,7 +127,8 @@ def _loop(
     deadman: Deadman,
 ) -> ControlLoop:
     """Return the loop, which renews `deadman` and reports to `status` five times a second."""
-    core = TickCore.of(rig, in_contact=job.saved_tare is not None)
+    timed = None if law is None else LawClock(law)
+    core = TickCore.of(rig, in_contact=job.saved_tare is not None, law=timed)
     arm = ArmLink(job.arm_record_fd)
 
     def on_status(inp: TickInput, state: TickState, output: TickOutput) -> None:
@@ -138,6 +148,7 @@ def _loop(
         watch=watch,
         operator_fd=job.operator_fd,
         on_status=on_status,
+        law_ns=(lambda: 0) if timed is None else timed.take_ns,
     )
 
 

@@ -22,7 +22,7 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import rig_from_toml
 from sim_backend.world.world import World
 from tools.log.world_log import ring_listener
-from tools.run.emulators import Emulator, address_of, open_emulator
+from tools.run.emulators import addresses_of, open_emulators
 from tools.run.jobs import EmulatorJob
 
 PRIORITY = 70
@@ -78,22 +78,14 @@ def main() -> int:
     rig = rig_from_toml(job.rig_toml)
     loop = EventLoop()
     ring = Ring(job.ring_fd)
-    opened: dict[str, Emulator] = {}
     try:
         world = World(rig, job.seed, monotonic_ns(), ring_listener(ring.push))
-        for device in job.devices:
-            opened[device] = open_emulator(loop, world, rig, device, job.kind_folder)
+        opened = open_emulators(loop, world, rig, job.devices, job.kind_folder)
     except PushError as error:
-        for emulator in opened.values():
-            emulator.close()
         status.error(error)
         return error.exit_code
     StopAtRest(loop, world, job.run_fd)
-    status.say(
-        "ready",
-        addresses={device: address_of(emulator) for device, emulator in opened.items()},
-        realtime=try_realtime(PRIORITY),
-    )
+    status.say("ready", addresses=addresses_of(opened), realtime=try_realtime(PRIORITY))
     gc.collect()
     gc.freeze()
     lock_memory()

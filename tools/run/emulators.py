@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from robot_io.clock import NS_PER_S, monotonic_ns
@@ -107,6 +108,19 @@ def open_emulator(loop: EventLoop, world: World, rig: RigConfig, device: str, fo
     return ExternalEmulator(loop, find_kind(device, kind, folder).Emulator(world, options))
 
 
+def open_emulators(
+    loop: EventLoop, world: World, rig: RigConfig, devices: Iterable[str], folder: str
+) -> dict[str, Emulator]:
+    """Open the emulator of each device. Raises as `open_emulator`, and then none is left open."""
+    opened: dict[str, Emulator] = {}
+    with contextlib.ExitStack() as opening:
+        for device in devices:
+            opened[device] = open_emulator(loop, world, rig, device, folder)
+            opening.callback(opened[device].close)
+        opening.pop_all()
+    return opened
+
+
 def endpoint(emulator: Emulator) -> dict[str, str]:
     """Return where an emulator can be reached, as `push emulate` prints it: its `port`, `host` or `url`."""
     if isinstance(emulator, Ft300Emulator):
@@ -122,3 +136,8 @@ def endpoint(emulator: Emulator) -> dict[str, str]:
 def address_of(emulator: Emulator) -> str:
     """Return the address that the emulator's driver connects to."""
     return next(value for name, value in endpoint(emulator).items() if name != "device")
+
+
+def addresses_of(opened: Mapping[str, Emulator]) -> dict[str, str]:
+    """Return the address of each device's emulator."""
+    return {device: address_of(emulator) for device, emulator in opened.items()}

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from msgspec.structs import astuple, replace
 
+from control.laws.law import Law
 from control.loop import ft_input
 from control.notes.run_notes import RunNotes, outcome
 from robot_io.clock import NS_PER_S, SIM_START_NS, SIM_WALL_OFFSET_NS, ClockNs, VirtualClock
@@ -40,6 +41,7 @@ from tools.log.run_log import RunLog
 from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
 from tools.run.facts.run_facts import run_facts
+from tools.run.law_clock import LawClock
 from tools.run.run_state import initial_state
 from tools.run.tick_core import TickCore
 
@@ -60,7 +62,10 @@ class LockstepLog(Protocol):
 
 
 class Lockstep:
-    """One push in lockstep. `log` receives each record as the rings would; `run` returns the final figures."""
+    """One push in lockstep. `log` receives each record as the rings would; `run` returns the final figures.
+
+    law: the rig's law where it is not a shipped one. Raises ConfigError without it.
+    """
 
     def __init__(
         self,
@@ -69,6 +74,7 @@ class Lockstep:
         log: LockstepLog,
         *,
         saved: SavedTare | None = None,
+        law: Law | None = None,
     ) -> None:
         self.rig = rig
         self._log = log
@@ -89,7 +95,8 @@ class Lockstep:
         self._ft_edge = InjectedSensor(self._ft, self.injection, rig)
         self._arm_edge = InjectedArm(self._arm, self.injection)
         self._base_edge = InjectedBase(self._base, self.injection)
-        self._core = TickCore.of(rig, in_contact=saved is not None)
+        self._law = None if law is None else LawClock(law, round(rig.limits.law_ms * 1e6))
+        self._core = TickCore.of(rig, in_contact=saved is not None, law=self._law)
         self._state = initial_state(saved)
         self._recorded = False
         self._gate = GateShell(self._core.safety.envelope, total_bounds(rig), START_NS)
@@ -138,7 +145,7 @@ class Lockstep:
             tick,
             now_ns,
             int(operator),
-            HostInput(0, 0, True, True, True, False, 0),
+            HostInput(0, 0, True, True, True, False, 0, law_ns=0 if self._law is None else self._law.take_ns()),
             ft_input(readings, self._ft_edge.health(), 0),
             self._arm_edge.read() or ArmRecord(),
             self._gate.record,

@@ -7,8 +7,8 @@
     records            gate -> control, arm -> control               memfd, newest wins
     pidfds             gate, arm, recorder -> control                readable when the process has ended
     run pipe           control -> arm, emulators                     nothing is written: EOF means control has ended
-     live feed          recorder -> live                              SEQPACKET, with --live; drops, nobody waits
-     operator pipe      launcher -> control                           a byte each: go, stop, pause, ..., alive
+    live feed          recorder -> live                              SEQPACKET, with --live; drops, nobody waits
+    operator pipe      launcher -> control                           a byte each: go, stop, pause, ..., alive
     status pipes       each of them -> launcher                      JSON lines
 
 A copy of an inherited descriptor left open in the launcher would hide the end of the process that holds it, so all

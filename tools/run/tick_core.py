@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 from msgspec.structs import replace
 
+from control.laws.law import Law
 from control.settings import Settings
 from control.step import step
 from robot_io.messages import BodyTwist, WorldTwist
@@ -23,9 +24,9 @@ class TickCore(msgspec.Struct, frozen=True):
     safety: SafetySettings
 
     @classmethod
-    def of(cls, rig: RigConfig, *, in_contact: bool = False) -> TickCore:
-        """Resolve the settings of a rig."""
-        return cls(Settings.of(rig, in_contact=in_contact), SafetySettings.of(rig))
+    def of(cls, rig: RigConfig, *, in_contact: bool = False, law: Law | None = None) -> TickCore:
+        """Resolve the settings of a rig. law: its law where it is not a shipped one; raises ConfigError without it."""
+        return cls(Settings.of(rig, in_contact=in_contact, law=law), SafetySettings.of(rig))
 
     def fold(self, state: TickState, inp: TickInput) -> tuple[TickState, TickOutput]:
         """Return the state after this tick and its output. Pure: same arguments, same result, bit for bit."""

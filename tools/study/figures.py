@@ -126,9 +126,10 @@ def _draw_slider(axes: Any, case: Case, state: State) -> None:
         linewidth=0.6,
     )
     contact_x, contact_y = x + c * contact[0] - si * contact[1], y + si * contact[0] + c * contact[1]
-    push = (
-        0.0 if case.controller == "open-loop" else (case.k_f + 1) * math.atan2(fy, fx) + case.k_y_rad_per_m * contact_y
-    )
+    push = {
+        "open-loop": 0.0,
+        "line": -case.k_y_rad_per_m * contact_y,
+    }.get(case.law, (case.k_f + 1) * math.atan2(fy, fx) + case.k_y_rad_per_m * contact_y)
     axes.plot(contact_x, contact_y, "k.", markersize=3)
     length = 0.5
     axes.plot(

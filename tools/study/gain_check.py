@@ -6,6 +6,7 @@ previous step, and a search finds the gain at which the growth rate of a small o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import atan2, cos, log, sin
 
 from sim_backend.physics.contact import PushedSlider
@@ -30,25 +31,37 @@ STICKING_FRICTION = 2.0
 
 def simulated_limit(body: PushedBody, k_f: float, *, frictionless: bool, near: float) -> float:
     """Return the k_y (rad/m) at which the growth rate of a small oscillation is 0, searched from `near`."""
+    return _zero_near(lambda k_y: growth_rate(body, k_f, k_y, frictionless=frictionless), near)
+
+
+def _zero_near(rate: Callable[[float], float], near: float) -> float:
     low, high = 0.97 * near, 1.03 * near
-    rate_low, rate_high = (growth_rate(body, k_f, k_y, frictionless=frictionless) for k_y in (low, high))
-    for _ in range(2):  # secant method: the rate is almost linear in k_y
+    rate_low, rate_high = rate(low), rate(high)
+    for _ in range(2):  # secant method: the rate is almost linear in the gain
         middle = low - rate_low * (high - low) / (rate_high - rate_low)
         low, rate_low = (high, rate_high) if abs(high - middle) < abs(low - middle) else (low, rate_low)
-        high, rate_high = middle, growth_rate(body, k_f, middle, frictionless=frictionless)
+        high, rate_high = middle, rate(middle)
     return low - rate_low * (high - low) / (rate_high - rate_low)
 
 
-def growth_rate(body: PushedBody, k_f: float, k_y_rad_per_m: float, *, frictionless: bool) -> float:
+def simulated_integral_limit(body: PushedBody, k_f: float, k_y: float, *, frictionless: bool, near: float) -> float:
+    """Return the k_i (rad/m^2) at which the growth rate of a small oscillation is 0, searched from `near`."""
+    return _zero_near(lambda k_i: growth_rate(body, k_f, k_y, k_i, frictionless=frictionless), near)
+
+
+def growth_rate(
+    body: PushedBody, k_f: float, k_y_rad_per_m: float, k_i_rad_per_m2: float = 0.0, *, frictionless: bool
+) -> float:
     """Return the growth rate (1/s) of a small oscillation, from the extremes of the ball's lateral position."""
     slider = _slider(body, 0.0 if frictionless else STICKING_FRICTION)
     step_s = _step_s(body, slides=frictionless)
     x, y = -body.rho_m - body.ball_radius_m, START_OFFSET_M
     fx, fy, t = 1.0, 0.0, 0.0
     extremes: list[tuple[float, float]] = []
-    old_dy = 0.0
+    old_dy = integral = 0.0
     while len(extremes) < SWINGS + 2 and t < LONGEST_S:
-        theta_p = (k_f + 1) * atan2(fy, fx) + k_y_rad_per_m * y
+        theta_p = (k_f + 1) * atan2(fy, fx) + k_y_rad_per_m * y + integral
+        integral += k_i_rad_per_m2 * y * SPEED_M_PER_S * step_s
         dx, dy = SPEED_M_PER_S * step_s * cos(theta_p), SPEED_M_PER_S * step_s * sin(theta_p)
         outcome = slider.step((x, y), (x + dx, y + dy), step_s)
         x, y, t = x + dx, y + dy, t + step_s

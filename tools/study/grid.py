@@ -7,27 +7,29 @@ run (the last key varies fastest), `[random]` draws `samples` cases uniformly fr
 from __future__ import annotations
 
 import itertools
+import logging
 import math
 import random
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 from msgspec import Meta
 
-from robot_io.errors import ConfigError
+from robot_io.errors import ConfigError, UsageError
 from robot_io.rig import toml as toml_text
 from robot_io.rig.checks import build
 from robot_io.rig.toml import Origins
 from robot_io.rig.types import Positive, Table
-from sim_backend.physics.lanes import Lane, Timing
+from sim_backend.physics.lanes import Lane, LaneLaw, Timing
 from sim_backend.physics.slider import Circle, Rectangle, pressure_distance_m
 
 MOST_CASES = 1_000_000
 MOST_STATES = 20_000_000
 """Recorded states of a study: about a gigabyte."""
 
+_NOTES = logging.getLogger(__name__)
 
 Length = Annotated[float, Meta(gt=0, le=1000)]
 Position = Annotated[float, Meta(ge=-1000, le=1000)]
@@ -51,7 +53,9 @@ class Case(Table, frozen=True):
     k_f: Annotated[float, Meta(ge=0, le=10)] = 0.1
     k_y_rad_per_m: Annotated[float, Meta(ge=0, le=10)] = 0.01
     speed_m_per_s: Annotated[float, Meta(gt=0, le=100)] = 0.1
-    controller: Literal["force", "open-loop"] = "force"
+    law: LaneLaw = "force"
+    k_i_rad_per_m2: Annotated[float, Meta(ge=0, le=10)] = 0.06
+    """Of the law `force-integral`."""
 
 
 class TimeTable(Table, frozen=True):
@@ -99,6 +103,9 @@ def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None)
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"this grid cannot be read: {error}", where=name, do="Give `paper` or a TOML file") from None
     data, origins = toml_text.parse(text, name)
+    _use_todays_names(data, origins, name)
+    for word in (changes.get("law"), *_laws(data)):
+        check_law(word, name)
     file = build(GridFile, data, origins, name)
     fixed = {**data.get("fixed", {}), **changes}
     ranges = _random_table(file, origins, name)
@@ -129,6 +136,35 @@ def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None)
             do="Raise record_s, or run fewer cases",
         )
     return Study(file.name, cases, timing)
+
+
+def check_law(law: object, where: str) -> None:
+    """Raise UsageError for a law that compiled lanes do not know."""
+    if isinstance(law, str) and law not in get_args(LaneLaw):
+        raise UsageError(
+            f"`push sweep` knows the shipped laws ({', '.join(get_args(LaneLaw))}), not `{law}`",
+            where=where,
+            do="Use push study, which runs any law",
+        )
+
+
+def _laws(data: Mapping[str, Any]) -> list[object]:
+    """Return the laws that a grid file names, whatever else is wrong with it."""
+    fixed, varied = data.get("fixed"), data.get("grid")
+    several = varied.get("law") if isinstance(varied, dict) else None
+    one = [fixed.get("law")] if isinstance(fixed, dict) else []
+    return [*one, *(several if isinstance(several, list) else [])]
+
+
+def _use_todays_names(data: dict[str, Any], origins: Origins, name: str) -> None:
+    """Read `controller`, which the law was called once, with a note."""
+    for table in ("fixed", "grid"):
+        held = data.get(table)
+        if isinstance(held, dict) and "controller" in held and "law" not in held:
+            where = origins.get((table, "controller"), name)
+            _NOTES.warning("%s: `controller` is read as `law`, which is its name now", where)
+            held["law"] = held.pop("controller")
+            origins[table, "law"] = where
 
 
 def _combinations(file: GridFile, origins: Origins, name: str) -> list[dict[str, Any]]:
@@ -203,7 +239,8 @@ def lane_of(case: Case) -> Lane:
         k_y_rad_per_m=case.k_y_rad_per_m,
         speed_m_per_s=case.speed_m_per_s,
         f_max_N=case.f_max_N,
-        open_loop=case.controller == "open-loop",
+        law=case.law,
+        k_i_rad_per_m2=case.k_i_rad_per_m2,
     )
 
 

@@ -90,7 +90,7 @@ def rig_of(item: HardwareItem) -> RigConfig:
     settings = [f"world.slider.{setting}" for setting in SLIDERS[item.slider]]
     settings += [f"world.floor.{setting}" for setting in FLOOR]
     settings += [
-        f"control.controller={item.controller}",
+        f"control.law={item.controller}",
         f"control.k_f={item.k_f!r}",
         f"control.k_y_rad_per_m={item.k_y_rad_per_m!r}",
         f"control.distance_m={DISTANCE_M!r}",
@@ -174,5 +174,5 @@ def check_flags(dt_s: float | None, open_loop: bool) -> None:
     """Raise UsageError for flags that only other studies accept."""
     if dt_s is not None or open_loop:
         raise UsageError(
-            "`push sweep hardware` has its own step and both controllers", do="Leave out --dt and --open-loop"
+            "`push sweep hardware` has its own step and both laws", do="Leave out --dt, --law and --open-loop"
         )

@@ -127,7 +127,8 @@ def _parameters(number: int, case: Case) -> Row:
         "k_f": case.k_f,
         "k_y": case.k_y_rad_per_m,
         "f_max": case.f_max_N,
-        "controller": case.controller,
+        "controller": case.law,
+        **({"k_i": case.k_i_rad_per_m2} if case.law == "force-integral" else {}),
     }
 
 

@@ -93,7 +93,8 @@ def _write_lanes(study: Study, store: Store, parts: list[Part]) -> tuple[dict[st
 
     rows = [row for part in parts for row in part.rows]
     states = np.concatenate([part.arrays["states"] for part in parts])
-    store.write_csv("results.csv", COLUMNS, rows)
+    integral = ("k_i",) if any("k_i" in row for row in rows) else ()
+    store.write_csv("results.csv", (*COLUMNS, *integral), rows)
     store.write_arrays("states.npz", {"states": states})
     summary = summarise(study, rows, states)
     store.write_json("summary.json", summary)

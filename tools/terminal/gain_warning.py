@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 
+from control.laws.force_integral import IntegralSettings
 from robot_io.errors import ConfigError
-from robot_io.rig.config import RigConfig
+from robot_io.rig.config import ControlConfig, RigConfig
 from sim_backend.physics.assumed_sliders import pushed_body, samples
 from sim_backend.physics.floor import FloorEffects
-from sim_backend.physics.gain_limits import WARN_SHARE, PushedBody, limit
+from sim_backend.physics.gain_limits import WARN_SHARE, PushedBody, integral_limit, limit
 from sim_backend.physics.slider import Circle, Rectangle
 from sim_backend.world.scene import slider_model
 from tools.rig import devices_at
+
+GAINS_MATTER = ("force", "force-integral")
+"""The laws whose gains the limits are for."""
 
 
 def gain_warning(rig: RigConfig) -> str | None:
@@ -20,15 +24,27 @@ def gain_warning(rig: RigConfig) -> str | None:
     Raises ConfigError if the simulated slider is not possible (it would tip over).
     """
     control, bodies = rig.control, rig_bodies(rig)
-    if control.controller != "force" or not bodies:
+    if control.law not in GAINS_MATTER or not bodies:
         return None
     highest = limit(bodies, control.k_f)
     if control.k_y_rad_per_m <= WARN_SHARE * highest:
-        return None
+        return _integral_warning(control, bodies) if control.law == "force-integral" else None
     margin = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
     return (
         f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may oscillate: for the sliders of this rig at this k_f "
         f"{margin}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds better ones"
+    )
+
+
+def _integral_warning(control: ControlConfig, bodies: list[PushedBody]) -> str | None:
+    k_i = float(str(control.law_settings.get("k_i_rad_per_m2", IntegralSettings().k_i_rad_per_m2)))
+    highest = integral_limit(bodies, control.k_f, control.k_y_rad_per_m)
+    if k_i <= WARN_SHARE * highest:
+        return None
+    return (
+        f"the integral's k_i {k_i:g} rad/m^2 may make the push swing: for the sliders of this rig at these gains the "
+        f"limit is {highest:.2g}, and beyond {WARN_SHARE:g} of it there is little margin; "
+        "`push tune --law force-integral` finds a better one"
     )
 
 

@@ -50,7 +50,7 @@ def summary(
         "object_lateral_error_m": pushed.lateral_m if pushed else None,
         "object_turned_rad": pushed.turned_rad if pushed else None,
         "wanted_distance_m": rig.control.distance_m,
-        "controller": rig.control.controller,
+        "law": rig.control.law,
         "rig": rig.name,
         "level": level,
         "seed": seed,
@@ -69,7 +69,7 @@ def summary(
         "safety_events": figures["events"],
         "fault_counts": figures["fault_counts"],
         "devices": devices,
-        "notes": notes,
+        "notes": [*([f"the law: {figures['law_error']}"] if figures.get("law_error") else []), *notes],
     }
 
 

@@ -39,7 +39,7 @@ def open_log(viewer: Path, log: Path, layouts: Layouts) -> None:
     """Open a log, and return when the viewer is closed. Raises EnvironmentFault if it cannot be opened."""
     if viewer.stem == "rerun":
         recording = layouts.rerun.with_suffix(".rrd")
-        _run(viewer, "mcap", "convert", log, "--application-id", RERUN_APPLICATION, "-o", recording)
+        _run(viewer, "mcap", "convert", log, "--application-id", RERUN_APPLICATION, "-o", recording, quiet=True)
         _run(viewer, recording, layouts.rerun)
     else:
         _run(viewer, log)
@@ -55,12 +55,24 @@ def by_hand(log: Path, layouts: Layouts) -> list[str]:
     ]
 
 
-def _run(program: Path, *words: str | Path) -> None:
+def _run(program: Path, *words: str | Path, quiet: bool = False) -> None:
+    """Run a program to its end; quiet: what it says is told only if it fails."""
+    nowhere = subprocess.DEVNULL
     try:
-        code = subprocess.run(
-            [program, *words], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False
-        ).returncode
+        done = subprocess.run(
+            [program, *words],
+            stdin=nowhere,
+            stdout=nowhere,
+            stderr=subprocess.PIPE if quiet else None,
+            text=True,
+            errors="replace",
+            check=False,
+        )
     except OSError as error:
         raise EnvironmentFault(f"it cannot be started: {error.strerror}", where=str(program)) from None
-    if code:
-        raise EnvironmentFault(f"it ended with exit code {code}", where=str(program), do="Open the log by hand")
+    if done.returncode:
+        said = (done.stderr or "").strip().splitlines()
+        why = f": {said[-1]}" if said else ""
+        raise EnvironmentFault(
+            f"it ended with exit code {done.returncode}{why}", where=str(program), do="Open the log by hand"
+        )

@@ -7,13 +7,14 @@ from typing import NamedTuple
 
 from safety.faults import FAULTS
 from tools.watch.ball_force import BallForce, direction, drawing
-from tools.watch.seen import DEVICES, Link
+from tools.watch.seen import DEVICES, Link, Stage
 from tools.watch.view import ArmView, BaseView, Feed, View
 
 DRAWN_FROM = 70
 """The drawing stands beside the numbers from this many columns on."""
 DRAWING_ROWS = 7
 FROM_ABOVE = "from above, forward is up"
+HOLDING = "holding"
 NOTHING_YET = "no reading of the sensor yet"
 
 
@@ -28,9 +29,8 @@ def picture(view: View, columns: int, *, unicode: bool) -> list[Line]:
     """Return the lines of the picture, none longer than `columns`."""
     lines = [Line(f"push watch {view.rig}: {view.source}", "title")]
     if view.stage is not None:
-        stage = view.stage
-        lines.append(Line(f"run: {stage.phase} {stage.mode}  {stage.progress_m:.2f} m"))
-        lines += [Line(f"{fault} {FAULTS[fault].text}", "bad") for fault in stage.faults if fault in FAULTS]
+        lines.append(Line(_run(view.stage)))
+        lines += [Line(f"{fault} {FAULTS[fault].text}", "bad") for fault in view.stage.faults if fault in FAULTS]
     lines += [Line(""), *_force(view, columns, unicode=unicode), Line("")]
     for device in DEVICES:
         lines += _wrapped(device, _facts(view, device), columns, _trouble(view, device))
@@ -41,17 +41,21 @@ def picture(view: View, columns: int, *, unicode: bool) -> list[Line]:
 
 def one_line(view: View) -> str:
     """Return the picture as one line, for where there is no terminal."""
+    parts = [_run(view.stage)] if view.stage is not None else []
     if view.force is None:
-        force = view.tare or NOTHING_YET
+        parts.append(view.tare or NOTHING_YET)
     else:
-        towards = direction(view.force.body)
-        force = f"{_said(view.force)}  BODY {_numbers(view.force.body)} N"
-        force += f" ({towards.axes})" if towards.axes else ""
-        force += f"  PATH {_numbers(view.force.path)} N" if view.force.path is not None else ""
-        force += f"  {_theta(view.force)}"
-    stage = f"{view.stage.phase} {view.stage.mode}  " if view.stage is not None else ""
-    devices = "  ".join(f"{device}: {', '.join(_facts(view, device))}" for device in DEVICES)
-    return f"{stage}{force}  {_offset(view)}  {devices}"
+        axes = direction(view.force.body).axes
+        parts += [_said(view.force), f"BODY {_numbers(view.force.body)} N{f' ({axes})' if axes else ''}"]
+        parts += [f"PATH {_numbers(view.force.path)} N"] if view.force.path is not None else []
+        parts.append(_theta(view.force))
+    parts.append(_offset(view))
+    parts += [f"{device}: {', '.join(_facts(view, device))}" for device in DEVICES]
+    return "  ".join(" ".join(part.split()) for part in parts)
+
+
+def _run(stage: Stage) -> str:
+    return f"run: {stage.phase} {stage.mode}  {stage.progress_m:.2f} m"
 
 
 def _force(view: View, columns: int, *, unicode: bool) -> list[Line]:
@@ -107,8 +111,15 @@ def _offset(view: View) -> str:
 
 
 def _trouble(view: View, device: str) -> bool:
+    """Return whether something about a device is not as a push needs it."""
     names = {"ft": ("ft",), "arm": ("arm",), "base": ("pose", "odometry")}[device]
-    return view.links[device].state != "up" or any(view.feeds[name].late for name in names)
+    if view.links[device].state != "up" or any(view.feeds[name].late for name in names):
+        return True
+    if device == "arm":
+        return view.arm is None or not view.arm.held or view.arm.state != HOLDING
+    if device == "base":
+        return bool(view.base.pose_flaw or view.base.stop_engaged or view.base.drivers_active is False)
+    return False
 
 
 def _facts(view: View, device: str) -> list[str]:

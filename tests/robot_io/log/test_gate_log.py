@@ -63,6 +63,16 @@ def test_odometry_without_a_pose_says_that_nothing_is_known_of_it_and_holds_no_n
     assert message.pose.pose.orientation.w == 1.0
 
 
+@pytest.mark.parametrize("came", [
+    OdometryPose("odom", "b", (1.0, NAN, 0.0), (0.0, 0.0, 0.0, 1.0)),
+    OdometryPose("odom", "b", (1.0, 2.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0,) * 35),
+    OdometryPose("odom", "b", (1.0, 2.0, 0.0), (0.0, 0.0, 0.0, 1.0), twist_covariance=(math.inf,) * 36),
+])  # fmt: skip
+def test_a_pose_of_odometry_that_is_not_whole_is_as_one_that_did_not_come(came):
+    twist = BodyTwist(0.1, 0.0, 0.0)
+    assert logged(BaseOdometry(twist, came)) == logged(BaseOdometry(twist))
+
+
 @pytest.mark.parametrize(("value", "topic", "flaw"), [
     (BasePose(Pose2D(NAN, 2.0, 0.5), "a number of the pose is null"), "/base/pose", "a number of the pose is null"),
     (BasePose(Pose2D(1.0, NAN, 0.5)), "/base/pose", "a number is not finite"),

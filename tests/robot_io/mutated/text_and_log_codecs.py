@@ -30,7 +30,7 @@ from robot_io.rig.topics import TopicsConfig
 from tests.robot_io.mcap import mcap_by_hand as by_hand
 from tests.robot_io.mutated.bytes_changed import TELLING, Turn, changed
 
-GOLDEN_LOG = Path(__file__).parents[2] / "golden" / "logs" / "sim.mcap"
+GOLDEN_LOG = Path(__file__).parents[2] / "golden" / "logs" / "sim-format-4.mcap"
 
 
 JSON_PIECES = (

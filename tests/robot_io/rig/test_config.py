@@ -37,6 +37,7 @@ DIMENSIONLESS = {
     "resolution": "N and N*m: in the docstring",
     "noise": "N and N*m: in the docstring",
     "options": "only the kind knows",
+    "law_settings": "only the law knows",
     "uncertainty": "in `unit`",
     "residual": "in `unit`",
 }
@@ -180,10 +181,10 @@ def test_the_line_of_a_key_is_found_however_it_is_spaced():
 def test_overrides_take_toml_values_minus_and_bare_words():
     rig = load_rig(
         "emulated",
-        ["path.direction_deg=-30", "control.controller=open-loop", "base.topics.ros_version=2", "ft.port=x=y"],
+        ["path.direction_deg=-30", "control.law=open-loop", "base.topics.ros_version=2", "ft.port=x=y"],
     )
     assert rig.path.direction_deg == -30.0
-    assert rig.control.controller == "open-loop"
+    assert rig.control.law == "open-loop"
     assert rig.base.topics.ros_version == 2
     assert rig.ft.port == "x=y"
     assert rig.control.k_f == load_rig("emulated").control.k_f

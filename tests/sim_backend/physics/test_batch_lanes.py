@@ -29,7 +29,9 @@ def largest_difference(states, records):
 
 
 def test_batch_equals_the_plain_lane():
-    lanes = table_one()[::23] + table_one(open_loop=True)[5::61] + table_one(k_f=0.3, k_y_rad_per_m=0.5)[8::61]
+    lanes = table_one()[::23] + table_one(law="open-loop")[5::61] + table_one(k_f=0.3, k_y_rad_per_m=0.5)[8::61]
+    lanes += table_one(law="line", k_y_rad_per_m=0.3)[3::61]
+    lanes += table_one(law="force-integral", k_f=0.3, k_y_rad_per_m=0.2, k_i_rad_per_m2=0.06)[2::61]
     timing = Timing(steps=1500, record_every=100)
     results, states = run_batch(lanes, timing)
     plain = [simulate_lane(lane, timing) for lane in lanes]
@@ -93,7 +95,7 @@ def test_a_circles_contact_lies_at_pi_minus_s_over_radius():
 @pytest.mark.parametrize(
     ("changes", "square", "circle"),
     [
-        ({"open_loop": True}, (27, 216, 0), (27, 0, 216)),
+        ({"law": "open-loop"}, (27, 216, 0), (27, 0, 216)),
         ({"k_y_rad_per_m": 0.3}, (87, 154, 2), (243, 0, 0)),
         ({"k_f": 0.3, "k_y_rad_per_m": 0.5}, (87, 126, 30), (225, 0, 18)),
     ],
@@ -106,7 +108,7 @@ def test_how_many_lanes_other_controllers_lose(changes, square, circle):
 
 
 def test_open_loop_loses_the_slider_within_five_metres_or_never():
-    results, _ = run_batch(table_one(open_loop=True), Timing())
+    results, _ = run_batch(table_one(law="open-loop"), Timing())
     survivors = [lane for lane, r in zip(table_one(), results, strict=True) if r.end is LaneEnd.OK]
     assert {(lane.s0_m, lane.phi0_rad) for lane in survivors} == {(0, 0.0)}  # balanced on the unstable equilibrium
     lost = [r.steps * 0.001 for r in results if r.end is not LaneEnd.OK]

@@ -2,19 +2,23 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from sim_backend.physics.gain_limits import (
     PushedBody,
     decay_per_m,
     fast_loop_k_f,
+    frictionless_integral_limit,
     frictionless_limit,
+    integral_limit,
     limit,
     offset_per_degree_m,
     offset_per_newton_m,
+    sticking_integral_limit,
     sticking_limit,
 )
-from tools.study.gain_check import growth_rate, simulated_limit
+from tools.study.gain_check import growth_rate, simulated_integral_limit, simulated_limit
 
 SQUARE_D = (math.sqrt(2) + math.asinh(1)) / 6
 BOX = PushedBody(round=False, rho_m=0.2, d_m=0.153, ball_radius_m=0.05, shift_m=0.045)
@@ -51,6 +55,50 @@ def test_a_floor_that_resists_along_the_path_needs_k_f():
             body = PushedBody(round=False, rho_m=0.2, d_m=0.15, along_over_across=tolerated * factor)
             assert (sticking_limit(body, k_f) > 0) is stable
             assert (frictionless_limit(body, k_f) > 0) is stable
+
+
+@pytest.mark.parametrize("body", [BOX, BARREL, PushedBody(round=False, rho_m=0.3, d_m=0.2, along_over_across=1.03)])
+def test_the_integral_s_limit_is_where_its_polynomial_has_roots_on_the_axis(body):
+    """The polynomials of docs/laws.md, with numbers, not solved but looked at."""
+    a2, k_f, k_y = body.along_over_across**2, 0.3, 0.2
+    kappa = k_f + 1 - a2
+    slope = a2 + body.rho_m * (body.rho_m + body.shift_m) / body.d_m**2
+    p = slope / (slope - k_f - 1)
+    m = p * sticking_limit(body, k_f)
+    k_i = sticking_integral_limit(body, k_f, k_y)
+    assert k_i > 0
+    assert _real_part([1, m - p * k_y, a2 * m / kappa * k_y - p * k_i, a2 * m / kappa * k_i]) == pytest.approx(
+        0, abs=1e-9
+    )
+    k_i = frictionless_integral_limit(body, k_f, k_y)
+    reach = body.rho_m + body.ball_radius_m
+    if body.round:
+        polynomial = [1, kappa / reach - k_y, a2 / reach * k_y - k_i, a2 / reach * k_i]
+    else:
+        h, e, n = (reach + body.shift_m) / body.d_m**2, a2 / body.d_m**2, kappa / body.d_m**2
+        polynomial = [1, h - k_y, n - k_y * h - k_i, k_y * e - k_i * h, k_i * e]
+    assert _real_part(polynomial) == pytest.approx(0, abs=1e-9)
+
+
+def _real_part(polynomial):
+    """Return the largest real part of a polynomial's roots."""
+    return max(root.real for root in np.roots(polynomial))
+
+
+def test_no_integral_is_stable_where_the_paper_s_law_is_not():
+    highest = limit([BOX, BARREL], 0.3)
+    assert integral_limit([BOX, BARREL], 0.3, 1.01 * highest) == 0.0
+    assert 0.0 < integral_limit([BOX, BARREL], 0.3, 0.9 * highest) < integral_limit([BOX, BARREL], 0.3, 0.5 * highest)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("body", [BOX, BARREL])
+@pytest.mark.parametrize("frictionless", [False, True])
+def test_the_world_agrees_on_the_integral_s_limit_to_a_percent(body, frictionless):
+    formula = frictionless_integral_limit if frictionless else sticking_integral_limit
+    expected = formula(body, 0.3, 0.2)
+    found = simulated_integral_limit(body, 0.3, 0.2, frictionless=frictionless, near=expected)
+    assert found == pytest.approx(expected, rel=0.01)
 
 
 def test_fast_loop_and_offsets():

@@ -33,6 +33,14 @@ def test_a_press_of_the_rig_is_read_from_its_time_on_for_its_time():
     assert read == pytest.approx([0.0, 0.0, -10.0, -10.0, 0.0])
 
 
+def test_the_presses_of_the_rig_come_one_after_another():
+    first = "{at_s = 1.0, for_s = 0.5, force_body_N = [-10.0, 0.0, 0.0]}"
+    second = "{at_s = 3.0, for_s = 0.5, force_body_N = [-4.0, 0.0, 0.0]}"
+    world = world_with(LIGHT, f"world.hand=[{first}, {second}]")
+    read = [world.read_ft(START + at_ms * NS_PER_MS)[2] for at_ms in (0, 1200, 2000, 3200, 4000)]
+    assert read == pytest.approx([0.0, -10.0, 0.0, -4.0, 0.0])
+
+
 def test_presses_add_up_and_have_a_lever():
     """5 N to the left at the ball, 0.15 m ahead of the sensor: moment (0, 0, 0.75) -> (0.75 cos a, 0.75 sin a, 0)."""
     world = world_with(LIGHT)

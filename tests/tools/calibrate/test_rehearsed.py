@@ -4,13 +4,15 @@ What is hidden is written here; what must be found follows from it by the defini
 """
 
 import math
+import os
+import pty
 import subprocess
 import tomllib
 
 import numpy as np
 import pytest
 
-from tests.push_runs import PUSH, finished
+from tests.push_runs import PUSH, finished, started
 from tests.tools.calibrate.feeds import rot
 
 SEED = 4
@@ -139,3 +141,44 @@ def test_a_rig_takes_what_was_measured_and_is_kept(folder):
     looked = finished(folder / "state", "doctor", "hidden.toml", "--json", cwd=folder, within_s=120.0).last_object
     age = next(row for row in looked["checks"] if row["check"] == "rig.calibration-age")
     assert age["evidence"] == "never calibrated: the contact point"
+
+
+@pytest.mark.long
+@pytest.mark.timeout(300)
+def test_the_ends_of_pushes_show_the_hidden_yaw(folder):
+    levels = [flag for device in ("ft", "arm", "base") for flag in ("--set", f"{device}.level=sim")]
+    hidden = ("--set", "world.truth.marker_offset=[0,0,0]", "--set", "ft.tare_s=5")
+    logs = [f"runs/{seed}" for seed in (1, 2, 3)]
+    for seed, log in enumerate(logs, 1):
+        flags = ("--fast", "--no-report", "--distance-m=5.5", f"--seed={seed}", f"--out={log}")
+        ended = finished(folder / "state", "run", "hidden.toml", *levels, *hidden, *flags, cwd=folder)
+        assert ended.code in (0, 9), ended.err
+    words = ("calibrate", "frame", "hidden.toml", "--from", *logs, "--json")
+    told = finished(folder / "state", *words, cwd=folder).last_object
+    assert told["log"] == logs
+    assert told["uncertainty"] <= 0.5
+    assert abs(told["value"] - YAW_DEG) <= 1.5 * told["uncertainty"]
+    short = finished(folder / "state", *words[:4], *logs[:2], "--json", cwd=folder)
+    assert short.code == 4
+    assert "11.0 m of pushing, at least 15 m" in short.last_object["error"]["what"]
+
+
+@pytest.mark.long
+@pytest.mark.timeout(120)
+def test_a_person_at_a_terminal_presses_enter(folder):
+    person, terminal = pty.openpty()
+    words = ("calibrate", "path", "hidden.toml", "--set", "world.truth.marker_offset=[0,0,0]", "--json")
+    with started(folder / "state", *words, cwd=folder, stdin=terminal) as run:
+        run.wait_for("let it stand, then press Enter")
+        assert not list(folder.glob("calibration/*"))
+        os.write(person, b"\n")
+        assert run.wait().last_object["what"] == "path"
+    with started(folder / "state", *words, cwd=folder, stdin=terminal) as run:
+        run.wait_for("let it stand, then press Enter")
+        os.write(person, b"\x04")  # the end of the input
+        ended = run.wait()
+    os.close(person)
+    os.close(terminal)
+    assert ended.code == 130
+    assert "nothing was written" in ended.last_object["error"]["what"]
+    assert len(list(folder.glob("calibration/*.toml"))) == 1

@@ -19,7 +19,7 @@ def test_the_c_twin_computes_the_same(tmp_path):
     if run_c is None:
         pytest.skip(reason)
     assert 5e-324 > 0, "loading fast-math code must not make the process flush tiny numbers"
-    study = paper_study({"controller": "open-loop"})
+    study = paper_study({"law": "open-loop"})
     rows = parameters([lane_of(case) for case in (*study.cases[::9], *paper_study({}).cases[::9])])
     timing = Timing(steps=2000)
     outputs = []

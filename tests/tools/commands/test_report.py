@@ -28,12 +28,13 @@ from robot_io.rig.config import RigConfig, load_rig, rig_from_toml, rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick, Phase
 from tools.cli import main
 from tools.commands import run_outputs
+from tools.laws import law_label
 from tools.log.run_log import RunLog
 from tools.report import process as report_process
 from tools.report.page import page, run_mark, write_report
 from tools.report.process import ReportProcess
 from tools.report.run_data import read_run
-from tools.report.run_facts import law_name, reader_facts
+from tools.report.run_facts import reader_facts
 from tools.report.run_summary import baseline_of, differences, tiles
 from tools.report.run_verdict import verdict
 
@@ -230,11 +231,11 @@ def test_a_law_is_called_by_its_own_name(ran):
     run = read_run(ran[0] / "run.mcap")
     for law, name in (
         ("force", "force feedback"),
-        ("open-loop", "open loop, straight ahead"),
+        ("open-loop", "open loop"),
         ("mine:Law", "mine:Law"),
     ):
-        rig = replace(run.rig, control=replace(run.rig.control, controller=law))
-        assert law_name(rig) == name
+        rig = replace(run.rig, control=replace(run.rig.control, law=law))
+        assert law_label(rig) == name
 
 
 def test_facts_begin_with_what_a_reader_asks(ran):

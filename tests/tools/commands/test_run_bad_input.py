@@ -74,7 +74,7 @@ def test_settings_that_cannot_be(state, tmp_path, setting, words):
 
 @pytest.mark.parametrize("controller", ["force", "open-loop"])
 def test_a_world_that_cannot_be_leaves_nothing_behind(state, tmp_path, controller):
-    argv = ("sim", "--fast", "--controller", controller, "--set", "world.floor.push_height_m=2")
+    argv = ("sim", "--fast", "--law", controller, "--set", "world.floor.push_height_m=2")
     assert "tips over" in push_fails(state, tmp_path, 2, *argv)["what"]
 
 
@@ -94,7 +94,7 @@ def test_a_rig_file_with_two_mistakes_names_both_with_their_lines(state, tmp_pat
         (["emulated", "--seed", "-1"], "-1"),
         (["emulated", "--seed", str(10**30)], str(10**30)),
         (["emulated", "--distance-m", "nan"], "nan"),
-        (["emulated", "--controller", "magic"], "magic"),
+        (["emulated", "--law", "magic"], "magic"),
         (["emulated", "--set", "ft.level=hardware", "--move-robot"], "ft.port"),
     ],
 )

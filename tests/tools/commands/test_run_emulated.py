@@ -407,7 +407,7 @@ def test_six_metres_with_force_feedback(state, tmp_path, host):
 @pytest.mark.parametrize("seed", [0, 7])
 @repeated_when_the_host_stalls
 def test_open_loop_loses_the_object(state, tmp_path, seed, host):
-    argv = ("run", "emulated", "--controller", "open-loop", "--distance-m", "6", "--seed", str(seed))
+    argv = ("run", "emulated", "--law", "open-loop", "--distance-m", "6", "--seed", str(seed))
     ended = finished(state, *argv, "--out", str(tmp_path / "run"), "--json", within_s=200.0, host=host)
     assert ended.code == 6, ended.err
     summary = ended.last_object

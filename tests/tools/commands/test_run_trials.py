@@ -14,7 +14,6 @@ from robot_io.mcap.read import read_summary
 from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished, one_error, started
 from tests.tools.commands.test_run_asks_first import robot
-from tools.places.trials_folder import read_trials, trial_folders
 
 SIM = ("run", "sim", "--fast", *QUICK, "--distance-m", "0.1")
 
@@ -26,18 +25,20 @@ def test_without_a_terminal_trials_follow_each_other_with_the_object_reset(state
     told = ended.last_object
     assert [trial["seed"] for trial in told["trials"]] == [5, 6, 7]
     assert (told["schema"], told["wanted"], told["exit_code"], told["out"]) == (1, 3, 0, str(out))
-    found = read_trials(out)
-    assert (found.rig, found.level, found.note, len(found.trials)) == ("sim", "sim", "box, 2 kg", 3)
+    found = json.loads((out / "trials.json").read_text())
+    assert (found["rig"], found["level"], found["note"], len(found["trials"])) == ("sim", "sim", "box, 2 kg", 3)
     rows = list(csv.DictReader((out / "trials.csv").read_text().splitlines()))
-    for folder, seed, row in zip(trial_folders(out), (5, 6, 7), rows, strict=True):
-        facts = read_summary(folder / "run.mcap").metadata["run"]
-        summary = json.loads((folder / "summary.json").read_text())
+    for folder, seed, row in zip(("trial-01", "trial-02", "trial-03"), (5, 6, 7), rows, strict=True):
+        facts = read_summary(out / folder / "run.mcap").metadata["run"]
+        summary = json.loads((out / folder / "summary.json").read_text())
         assert (facts["seed"], facts["note"]) == (str(seed), "box, 2 kg")
         assert (summary["seed"], summary["note"], summary["verdict"]) == (seed, "box, 2 kg", "done")
         assert float(row["distance_m"]) == summary["distance_m"] == pytest.approx(0.1, abs=0.02)
         assert float(row["worst_force_N"]) == summary["worst_force_N"] > 5.0
     assert "3 of 3 trials done" in ended.err
     assert "worst force" in ended.err
+    assert finished(state, "report", str(out), "--out", str(tmp_path / "beside"), "--json").code == 0
+    assert "box, 2 kg" in (tmp_path / "beside" / "compare.html").read_text()
 
 
 def test_a_trial_is_the_run_of_its_seed_from_the_same_start(state, tmp_path):

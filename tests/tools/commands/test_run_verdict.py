@@ -80,7 +80,7 @@ def test_a_wider_tolerance_of_the_rig_lets_the_same_push_be_done(tmp_path):
 
 
 def test_a_lost_object_is_told_where_it_stands_not_where_the_pusher_is(tmp_path):
-    code, summary, said = ran(tmp_path, "--distance-m", "6", "--controller", "open-loop", "--no-report")
+    code, summary, said = ran(tmp_path, "--distance-m", "6", "--law", "open-loop", "--no-report")
     assert (code, summary["verdict"]) == (6, "contact lost")
     assert summary["first_fault"]["id"] == "F52-hold"
     states = [STATE_CDR.decode(m.payload).slider for m in messages(tmp_path / "run" / "run.mcap", "/world/state")]

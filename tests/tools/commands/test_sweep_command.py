@@ -273,6 +273,37 @@ def test_gains_open_loop_and_step_change_every_case(tmp_path, grid, capsys):
     assert max(int(row["steps"]) for row in rows) <= 1000
 
 
+def test_every_shipped_law_can_be_swept(tmp_path, capsys):
+    text = '[grid]\nlaw = ["force", "open-loop", "line", "force-integral"]\n[time]\nduration_s = 10\n'
+    path = tmp_path / "laws.toml"
+    path.write_text(text, encoding="utf-8")
+    assert push(capsys, path, "--out", tmp_path / "out", "--workers", 1)[0] == 0
+    rows = rows_of(tmp_path / "out")
+    assert [row["controller"] for row in rows] == ["force", "open-loop", "line", "force-integral"]
+    assert [row["k_i"] for row in rows] == ["", "", "", "0.06"]
+
+
+@pytest.mark.parametrize(
+    "text", ['[grid]\nlaw = ["force", "my:Law"]\n', '[fixed]\nlaw = "my:Law"\n[grid]\nk_f = [0.1]\n']
+)
+def test_a_law_of_ones_own_is_for_push_study(tmp_path, capsys, text):
+    path = tmp_path / "laws.toml"
+    path.write_text(text, encoding="utf-8")
+    code, _, err = push(capsys, path, "--out", tmp_path / "out")
+    assert code == 2
+    assert "push study" in err
+    assert not (tmp_path / "out").exists()
+    assert push(capsys, "paper", "--law", "my:Law", "--out", tmp_path / "out")[0] == 2
+
+
+def test_the_law_s_old_name_in_a_grid_is_read_with_a_note(tmp_path, capsys, caplog):
+    path = tmp_path / "laws.toml"
+    path.write_text('[grid]\ncontroller = ["open-loop"]\n[time]\nduration_s = 10\n', encoding="utf-8")
+    assert push(capsys, path, "--out", tmp_path / "out", "--workers", 1)[0] == 0
+    assert [row["controller"] for row in rows_of(tmp_path / "out")] == ["open-loop"]
+    assert caplog.messages == [f"{path}:2: `controller` is read as `law`, which is its name now"]
+
+
 def test_monte_carlo_draws_are_seeded(tmp_path, capsys):
     text = (
         '[grid]\nshape = ["square", "circle"]\n[random]\nsamples = 5\nseed = SEED\n'

@@ -69,6 +69,23 @@ def test_simulation_agrees_to_a_percent(tmp_path, capsys):
     assert "simulated" in err
 
 
+def test_the_integral_gets_half_of_its_limit(tmp_path, capsys):
+    _, result, err = tune(capsys, "--law", "force-integral", "--no-check", "--out", tmp_path / "out")
+    integral = result["integral"]
+    assert 0.45 < integral["k_i_rad_per_m2"] / integral["limit_k_i_rad_per_m2"] <= 0.5
+    assert "the integral's k_i" in err
+
+
+@pytest.mark.parametrize(
+    ("law", "words"), [("mine:Mine", "push study"), ("line", "no gain of it keeps an object"), ("open-loop", "no gain")]
+)
+def test_a_law_without_limits_is_refused_in_one_sentence(tmp_path, capsys, law, words):
+    code, answer, err = tune(capsys, "--law", law, "--no-check", "--out", tmp_path / "out")
+    assert code == 2
+    assert words in f"{answer['error']['what']} {answer['error']['do']}"
+    assert len(err.strip().splitlines()) == 1
+
+
 @pytest.mark.parametrize(
     "argv",
     [
@@ -102,13 +119,20 @@ def test_a_full_folder_is_left_alone(tmp_path, capsys):
     assert [p.name for p in tmp_path.iterdir()] == ["mine"]
 
 
+def test_run_warns_of_an_integral_with_little_margin_only():
+    assert gain_warning(load_rig("sim", ["control.law=force-integral"])) is None
+    told = gain_warning(load_rig("sim", ["control.law=force-integral", "control.law_settings.k_i_rad_per_m2=0.08"]))
+    assert told is not None
+    assert "k_i 0.08" in told
+
+
 def test_run_warns_of_gains_with_little_margin_only():
     assert gain_warning(load_rig("sim")) is None
     paper = gain_warning(load_rig("sim", ["control.k_f=0.1", "control.k_y_rad_per_m=0.3"]))
     assert paper is not None
     assert "0.1/0.3" in paper
     assert "\n" not in paper
-    assert gain_warning(load_rig("sim", ["control.controller=open-loop", "control.k_y_rad_per_m=2"])) is None
+    assert gain_warning(load_rig("sim", ["control.law=open-loop", "control.k_y_rad_per_m=2"])) is None
     assert gain_warning(load_rig("sim", ["world.slider.shape=circle", "control.k_y_rad_per_m=1.5"])) is not None
     assert all(gain_warning(load_rig(name)) is None for name in ("emulated", "barrel", "thing"))
     assert gain_warning(load_rig("paper-gains")) is not None

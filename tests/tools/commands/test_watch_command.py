@@ -19,6 +19,8 @@ from tests.wire.bridge_process import running_bridge
 from tests.wire.ft300_process import ft300_process
 from tests.wire.ur_process import EmulatorProcess as UrProcess
 from tests.wire.ur_process import wait_until
+from tools.places.device_locks import DeviceLocks
+from tools.rig import resolve_rig
 
 FRAME = b"\x1b[H"
 ALTERNATE, NORMAL = b"\x1b[?1049h", b"\x1b[?1049l"
@@ -110,12 +112,25 @@ def test_killed_it_leaves_no_process_and_no_stream_behind_and_meanwhile_no_run_s
         assert not sensor.ask("counters")["streaming"]
 
 
-def test_where_there_is_no_terminal_it_prints_lines(state):
-    with started(state, "watch", "emulated") as watch:
-        wait_until(lambda: "holding" in watch.out and watch.out.count("\n") >= 3, "lines", 30.0)
+def test_where_there_is_no_terminal_it_prints_lines_and_shows_the_hands_of_the_rig(state):
+    hand = "world.hand=[{at_s = 6.0, for_s = 60.0, force_body_N = [0.0, 12.0, 0.0]}]"
+    with started(state, "watch", "emulated", "--set", hand) as watch:
+        wait_until(lambda: "LEFT 1" in watch.out and watch.out.count("\n") >= 3, "lines", 40.0)
+        assert "no force" in watch.out
+        assert "BODY" in watch.out
         assert "\x1b" not in watch.out
         watch.signal(signal.SIGHUP)
         assert watch.wait().code == 0
+
+
+def test_devices_that_are_all_in_use_are_not_opened(state, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(state))
+    where = {"ft.port": "socket://127.0.0.1:1", "arm.host": "127.0.0.1", "base.url": "ws://127.0.0.1:2"}
+    keys = [f"{key}={value}" for key, value in where.items()] + [f"{d}.level=hardware" for d in ("ft", "arm", "base")]
+    with DeviceLocks(resolve_rig("emulated", keys)):
+        settings = [word for key in keys for word in ("--set", key)]
+        error = one_error(finished(state, "watch", "emulated", "--json", *settings), 3)
+    assert f"process {os.getpid()}" in error["what"]
 
 
 def test_at_level_sim_there_is_nothing_to_watch(state):
@@ -207,7 +222,7 @@ def test_keys_that_signal_end_it_too(state, key):
 
 
 def test_a_simulated_run_is_watched_through_its_log(state, tmp_path):
-    argv = ("run", "sim", "--distance-m", "0.2", "--out", str(tmp_path / "out"), *QUICK)
+    argv = ("run", "sim", "--distance-m", "0.6", "--out", str(tmp_path / "out"), *QUICK)
     with started(state, *argv) as run:
         run.wait_for("APPROACH|PUSH")
         with started(state, "watch", "sim", "--json") as watch:

@@ -14,7 +14,7 @@ def runs(tmp_path_factory):
     others = {
         "one": ("--seed", "1"),
         "two": ("--seed", "2"),
-        "open": ("--seed", "1", "--controller", "open-loop"),
+        "open": ("--seed", "1", "--law", "open-loop"),
         "turned": ("--seed", "1", "--set", "path.direction_deg=20"),
     }
     for name, options in others.items():

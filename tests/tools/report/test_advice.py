@@ -65,10 +65,16 @@ def test_a_short_push_does_not_whatever_it_reads(run, length_m):
 
 def test_a_short_tare_may_explain_what_is_seen(run):
     """0.24 N of 15 N are 0.9 degrees."""
-    lines = what_to_try(pushed(run, 18.0, aside_deg=0.7, end_m=0.15, tare_s=1.0), DONE)
+    lines = what_to_try(pushed(run, 18.0, aside_deg=0.7, end_m=-0.11, tare_s=1.0), DONE)
     assert FRAME not in " ".join(lines)
     assert "ft.tare_s=5" in lines[0]
-    assert FRAME in what_to_try(pushed(run, 18.0, aside_deg=1.2, end_m=0.15, tare_s=1.0), DONE)[0]
+    assert FRAME in what_to_try(pushed(run, 18.0, aside_deg=1.2, end_m=-0.14, tare_s=1.0), DONE)[0]
+
+
+def test_an_angle_that_the_offset_does_not_confirm_is_not_the_frame(run):
+    """A settled push with 1 degree of error ends 0.11 m to the other side; the floor can turn the force for a while."""
+    for end_m in (0.0, 0.33, -0.02):
+        assert FRAME not in " ".join(what_to_try(pushed(run, 18.0, aside_deg=3.0, end_m=end_m), DONE))
 
 
 def test_a_push_on_its_line_is_left_alone(run):

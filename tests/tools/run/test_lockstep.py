@@ -23,7 +23,7 @@ from robot_io.log.world_messages import STATE_CDR
 from robot_io.mcap.read import read_log, read_summary
 from robot_io.messages import BaseOdometry, BodyTwist
 from robot_io.rig.config import rig_to_toml
-from robot_io.tick import TICK_CDR
+from robot_io.tick import TICK_CDR, Phase
 from sim_backend.sim.ridgeback import SimRidgeback
 from tests.push_runs import QUICK
 from tests.replay.runs import PUSH, ROOT, push
@@ -254,3 +254,34 @@ def test_a_disk_that_fills_up_is_a_sentence_and_what_was_written_can_be_saved(tm
     assert "unexpected" not in done.stderr
     assert push("log", "recover", tmp_path / "run", state=tmp_path).returncode == 0
     assert push("replay", tmp_path / "run" / "run_recovered.mcap", state=tmp_path).returncode == 0
+
+
+class Unlogged:
+    """A log that keeps nothing."""
+
+    def record(self, kind: int, time_ns: int, payload: bytes) -> None:
+        pass
+
+    def tick(self, time_ns: int, payload: bytes, tick: object) -> None:
+        pass
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+def test_ten_minutes_of_pause_with_the_noise_of_all_devices_cost_nothing(seed):
+    """In the middle of the push and in the retreat; neither a fault nor a loss nor a resume, and the same verdict."""
+    one = Lockstep(resolve_rig("sim", ("control.distance_m=1.0",)), seed, Unlogged())
+    left = {Phase.PUSH: 60_000, Phase.RETREAT: 6_000}
+
+    def on_tick(inp, state, _output):
+        phase = Phase(state.control.phase)
+        due = left.get(phase, 0) > 0 and (phase != Phase.PUSH or state.control.progress_m > 0.5)
+        one.paused = due
+        if due:
+            left[phase] -= 1
+
+    figures = one.run(on_tick)
+    assert set(left.values()) == {0}
+    assert (figures["exit_code"], figures["fault_counts"], figures["lost_times"]) == (0, {}, 0)
+    assert (figures["pauses"], round(figures["paused_s"])) == (2, 660)
+    assert abs(figures["lateral_error_m"]) < 0.1

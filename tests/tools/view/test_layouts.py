@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from robot_io.log.channels import BY_TOPIC
 from robot_io.mcap.read import read_summary
 from robot_io.tick import Mode, Phase
 from tests.push_runs import QUICK, finished
@@ -15,7 +14,6 @@ from tools.view import lichtblick
 from tools.view.panels import PLOTS, SCENE_TOPICS, SIGNALS_TOPIC, STATES, contents
 
 ROOT = Path(__file__).resolve().parents[3]
-SIGNALS = pytest.mark.skipif(SIGNALS_TOPIC not in BY_TOPIC, reason=f"this version writes no {SIGNALS_TOPIC}")
 FIRST_SCREEN = {
     "force_n",
     "force_along_n",
@@ -47,7 +45,6 @@ def fields_of(definition: str) -> set[str]:
     return {two[1] for two in words if len(two) == 2 and "=" not in two[1]}
 
 
-@SIGNALS
 @pytest.mark.parametrize("path", lichtblick.paths(lichtblick.layout()))
 def test_every_path_of_the_layout_is_in_a_log(path, schemas):
     topic, _, field = path.partition(".")
@@ -55,7 +52,6 @@ def test_every_path_of_the_layout_is_in_a_log(path, schemas):
     assert not field or field in schemas[topic]
 
 
-@SIGNALS
 def test_every_field_of_the_blueprint_is_in_a_log(schemas):
     fields = {line.field for plot in PLOTS for line in plot.lines} | set(STATES)
     assert fields <= schemas[SIGNALS_TOPIC]

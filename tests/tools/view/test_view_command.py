@@ -33,7 +33,7 @@ def install(tmp_path, monkeypatch):
     def put(name: str, code: int = 0) -> Path:
         calls = tmp_path / f"{name}.calls"
         program = programs / name
-        program.write_text(f'#!/bin/sh\necho "$@" >> {calls}\nexit {code}\n')
+        program.write_text(f'#!/bin/sh\necho "$@" >> {calls}\necho "so said {name}" >&2\nexit {code}\n')
         program.chmod(0o755)
         return calls
 
@@ -56,7 +56,7 @@ def test_again_it_writes_over_its_own_files(log, install):
     assert sorted(path.name for path in (log.parent / "view").iterdir()) == ["lichtblick.json", "push.rbl"]
 
 
-def test_rerun_is_given_a_recording_of_the_layout_s_application(log, install):
+def test_rerun_is_given_a_recording_of_the_layout_s_application(log, install, capfd):
     calls = install("rerun")
     install("lichtblick")
     assert main(["view", str(log)]) == 0
@@ -65,6 +65,7 @@ def test_rerun_is_given_a_recording_of_the_layout_s_application(log, install):
         f"mcap convert {log} --application-id push -o {view / 'push.rrd'}",
         f"{view / 'push.rrd'} {view / 'push.rbl'}",
     ]
+    assert capfd.readouterr().err.count("so said rerun") == 1  # of the window; what converts is silent
 
 
 @pytest.mark.parametrize("name", ["lichtblick", "foxglove-studio"])
@@ -101,7 +102,7 @@ def test_a_viewer_that_fails_is_named(log, install, capsys):
     assert main(["view", str(log)]) == ENVIRONMENT_FAULT
     told = capsys.readouterr().err
     assert "rerun" in told
-    assert "exit code 7" in told
+    assert "exit code 7: so said rerun" in told
 
 
 def test_what_is_no_log_is_refused_before_anything_is_written(tmp_path, install, capsys):

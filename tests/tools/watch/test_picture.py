@@ -128,6 +128,29 @@ def test_an_arm_elsewhere_names_the_joint():
     assert "OFF THE HELD POSE, +0.200 rad (wrist 1)" in text
 
 
+def style_of(seen, device):
+    found = picture(view_of(seen, "here", NOW_NS), 200, unicode=True)
+    return next(line.style for line in found if line.text.startswith(device))
+
+
+def test_what_a_push_does_not_allow_is_marked():
+    assert [style_of(a_seen_robot(), device) for device in ("ft", "arm", "base")] == ["", "", ""]
+    assert style_of(a_seen_robot(joints=(0.0, *HELD[1:])), "arm") == "bad"
+    for status in (BaseStatus(True, True, 25.0), BaseStatus(False, False, 25.0)):
+        seen = a_seen_robot()
+        seen.take_device(DeviceReport("base", "up", base=(stamped(BaseReport(status), 2, 5),)))
+        assert style_of(seen, "base") == "bad"
+    later = picture(view_of(a_seen_robot(), "here", NOW_NS + NS_PER_S), 200, unicode=True)
+    assert "OLD" in next(line.text for line in later if line.text.startswith("ft"))
+
+
+def test_one_line_has_it_all():
+    line = one_line(view_of(a_seen_robot(), "here", NOW_NS))
+    for piece in ("BACKWARD 15.", "(-x)", "PATH -15.", "theta_f", "y_c +0.020 m", "ft: 100 Hz", "arm: ", "no stop"):
+        assert piece in line, piece
+    assert "\n" not in line
+
+
 def test_a_lost_device_is_said_in_words_and_marked():
     seen = a_seen_robot()
     seen.take_device(DeviceReport("base", "lost", "ws://127.0.0.1:1: nothing listens. Start rosbridge"))

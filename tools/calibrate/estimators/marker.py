@@ -43,12 +43,13 @@ def estimate_marker(straight: Straight, turning: Array, current: tuple[float, fl
     circle = _circle(turning)
     yaw, yaw_error = _yaw(straight, circle)
     x, y = seen_from_frame(*circle.offset_m, -yaw)
-    place_error, wander = math.hypot(circle.error_m, math.hypot(x, y) * yaw_error), circle.wander_m
-    uncertainty = K * place_error
+    wander = circle.wander_m
+    # An error of the yaw turns them around the base's middle: sideways as far as they are ahead of it.
+    x_error, y_error = math.hypot(circle.error_m, y * yaw_error), math.hypot(circle.error_m, x * yaw_error)
     return Estimate(
         "marker",
         (x, y, yaw),
-        (uncertainty, uncertainty, K * yaw_error),
+        (K * x_error, K * y_error, K * yaw_error),
         "m, m, rad",
         (wander, wander, abs(_turned(straight))),
         "driven straight and turned on the spot",

@@ -17,6 +17,7 @@ class Shell(NamedTuple):
 
 WHOLE = (
     "control/*.py",
+    "control/laws/*.py",
     "control/notes/*.py",
     "safety/*.py",
     "safety/checks/*.py",

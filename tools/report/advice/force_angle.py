@@ -22,13 +22,15 @@ K = 2.0
 
 
 class ForceAngle(NamedTuple):
-    """The mean angle of the force over the last `over_m` of a push, and what may explain it (rad, without sign).
+    """The mean angle of the force over the last `over_m` of a push (rad, left positive), and what may explain it.
 
+    offset_rad: the angle that the offset at the end stands for, once the push has settled there.
     transient_rad: what may be left of the greatest angle before, by the slowest pole of the rig's sliders.
     tare_rad: two standard errors of the tare or what the sensor read after the push, whichever is more, at `force_N`.
     """
 
     seen_rad: float
+    offset_rad: float
     over_m: float
     transient_rad: float
     tare_rad: float
@@ -36,8 +38,12 @@ class ForceAngle(NamedTuple):
 
     @property
     def points_at_the_frame(self) -> bool:
-        """Return whether start and tare together leave something that the sensor's mounting has to explain."""
-        return abs(self.seen_rad) > self.transient_rad + self.tare_rad
+        """Return whether start and tare together leave something that the sensor's mounting has to explain.
+
+        Angle and offset have to tell of it alike: the floor alone can turn the force for a metre or two.
+        """
+        alike = self.seen_rad * self.offset_rad > 0.0
+        return alike and min(abs(self.seen_rad), abs(self.offset_rad)) > self.transient_rad + self.tare_rad
 
 
 def force_angle(run: RunData) -> ForceAngle | None:
@@ -47,7 +53,7 @@ def force_angle(run: RunData) -> ForceAngle | None:
     along, angle = run.ticks["along_m"][pushing], run.ticks["theta_f"][pushing]
     known = np.isfinite(along)
     along, angle = along[known], angle[known]
-    if control.controller != "force" or not control.k_y_rad_per_m or len(along) < 2 or run.last is None:
+    if control.law != "force" or not control.k_y_rad_per_m or len(along) < 2 or run.last is None:
         return None
     pushed_m = float(along[-1] - along[0])
     if pushed_m < SHORTEST_M:
@@ -65,6 +71,7 @@ def force_angle(run: RunData) -> ForceAngle | None:
     tare_N = max(tare_error_newtons(run.rig), residual_N if math.isfinite(residual_N) else 0.0)
     return ForceAngle(
         seen_rad=float(np.mean(angle[last])),
+        offset_rad=-run.last.after.control.end_lateral_m * control.k_y_rad_per_m / (1.0 + control.k_f),
         over_m=over_m,
         transient_rad=abs(float(angle[peak])) * left,
         tare_rad=math.atan2(tare_N, force_N),

@@ -42,9 +42,9 @@ def what_to_try(run: RunData, verdict: Verdict) -> list[str]:
     against = [item.id for item in verdict.trust if item.says == "against"]
     if not verdict.first_fault:
         lines += [BY_EVIDENCE[name] for name in against if name in BY_EVIDENCE]
-    lost = not verdict.good and run.rig.control.controller == "open-loop"
+    lost = not verdict.good and run.rig.control.law == "open-loop"
     if lost:
-        lines.append("This run steered without force feedback: `--controller force` is the law of the paper.")
+        lines.append("This run steered without force feedback: `--law force` is the law of the paper.")
     missed = set(LINE) & set(against)
     if not verdict.first_fault and not lost:
         lines += _of_the_line(run, bool(missed))
@@ -74,8 +74,9 @@ def _of_the_line(run: RunData, missed: bool) -> list[str]:
 def _next_step(run: RunData, angle: ForceAngle, per_newton_m: float) -> str:
     seen, start, tare = (math.degrees(a) for a in (angle.seen_rad, angle.transient_rad, angle.tare_rad))
     found = (
-        f"Over the last {angle.over_m:.1f} m the force pointed {seen:+.1f} degrees aside; what is left of the start "
-        f"explains at most {start:.1f}, the tare {tare:.1f}"
+        f"Over the last {angle.over_m:.1f} m the force pointed {seen:+.1f} degrees aside, and the offset at the end "
+        f"stands for {math.degrees(angle.offset_rad):+.1f}; what is left of the start explains at most {start:.1f}, "
+        f"the tare {tare:.1f}"
     )
     if angle.points_at_the_frame:
         return f"{found}: the sensor's mounting is off, and `{FRAME}` measures it."

@@ -7,13 +7,14 @@ from typing import Any
 
 import msgspec
 
+from tools.laws import law_label
 from tools.report.run_data import RunData
-from tools.report.run_facts import LAWS
 from tools.report.run_summary import flat_settings
 
 MOST_WORDS = 3
-FIRST = ("control.controller", "control.k_f", "control.k_y_rad_per_m")
+FIRST = ("control.law", "control.k_f", "control.k_y_rad_per_m")
 """Settings that are named before all others."""
+LAW_SETTINGS = "control.law_settings."
 OF_THE_RIG = ("world.", "sliders.", "ft.", "arm.", "base.", "frames.", "limits.", "goal.", "workspace.")
 """Settings that a rig's name stands for where the names differ."""
 
@@ -30,6 +31,8 @@ def differing_settings(runs: Sequence[RunData]) -> dict[str, list[str]]:
 def labels(runs: Sequence[RunData]) -> list[str]:
     """Return a label for each run, all different: its differing settings, and its folder where these are not enough."""
     differing = differing_settings(runs)
+    if "control.law" in differing:  # a law's name stands for the settings that the others do not have
+        differing = {n: found for n, found in differing.items() if not (n.startswith(LAW_SETTINGS) and "-" in found)}
     if "name" in differing:
         differing = {name: found for name, found in differing.items() if not name.startswith(OF_THE_RIG)}
     words = [[_words(name, found[i]) for name, found in differing.items()] for i in range(len(runs))]
@@ -43,7 +46,8 @@ def labels(runs: Sequence[RunData]) -> list[str]:
 def _settings(run: RunData) -> dict[str, Any]:
     found = flat_settings(msgspec.to_builtins(run.rig))
     found.pop("description", None)
-    return found | {"seed": run.facts.get("seed", "-")}
+    found = {name: value for name, value in found.items() if not name.startswith("control.law_facts")}
+    return found | {"control.law": law_label(run.rig), "seed": run.facts.get("seed", "-")}
 
 
 def _rank(name: str) -> tuple[int, str]:
@@ -53,8 +57,8 @@ def _rank(name: str) -> tuple[int, str]:
 
 
 def _words(name: str, value: str) -> str:
-    if name == "control.controller":
-        return LAWS.get(value, f"law {value}").partition(",")[0]
+    if name == "control.law":
+        return value
     short = {"name": "rig", "control.k_y_rad_per_m": "k_y"}.get(name, name.rpartition(".")[2])
     return f"{short} {value}"
 

@@ -47,7 +47,7 @@ class Line:
 
 def line_of(one: ComparedRun) -> Line:
     """Return how a run is drawn, the same in picture, table and film."""
-    return Line(one.number, one.run.rig.control.controller)
+    return Line(one.number, one.run.rig.control.law)
 
 
 def overlay(runs: Sequence[ComparedRun]) -> Figure:

@@ -46,7 +46,7 @@ def outlook(rig: RigConfig) -> dict[str, Any]:
             base: {"level": rig.base.level, "url": rig.base.url},
         },
         "distance_m": rig.control.distance_m,
-        "controller": rig.control.controller,
+        "law": rig.control.law,
         "push_speed_m_per_s": rig.control.push_speed_m_per_s,
         "bounds": bounds_of(rig),
     }
