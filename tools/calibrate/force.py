@@ -9,11 +9,11 @@ from robot_io.messages import Joints, Vector3
 from tools.calibrate.devices import SensorFeed, arm_joints, open_sensor
 from tools.calibrate.estimators.bias import estimate_bias
 from tools.calibrate.estimators.cord import Pull, check_directions, estimate_yaw
-from tools.calibrate.estimators.estimate import Estimate
+from tools.calibrate.estimators.estimate import Array, Estimate
 from tools.calibrate.estimators.sign import DIRECTIONS, estimate_sign
 from tools.calibrate.estimators.steady import Steady, steady
 from tools.calibrate.estimators.weight import FEWEST, Pose, estimate_mounting
-from tools.calibrate.people import PoseArm, Press, Rest, ask
+from tools.calibrate.people import PoseArm, Press, Rest, ask, tell
 from tools.calibrate.session import Session
 from tools.places import saved_tare
 
@@ -40,7 +40,7 @@ def measure_bias(session: Session, seconds: float) -> Estimate:
     rig = session.rig
     with open_sensor(rig, session.folder) as sensor:
         ask(session.operator, Rest(FREE), sensor.idle)
-        found = estimate_bias(*sensor.collect(seconds), rig.ft.noise)
+        found = estimate_bias(*_collected(session, sensor, seconds, "keep everything still"), rig.ft.noise)
     a, b, c, d, e, f = found.value
     saved_tare.save(rig, (a, b, c, d, e, f), arm_joints(rig, session.folder))
     return found
@@ -85,7 +85,7 @@ def measure_weight(session: Session) -> Estimate:
             text = f"Pose {number} of {POSES} (at least {FEWEST}): move the arm {where}, let go of it"
             a, b, c, d, e, f = (q + by for q, by in zip(held, turn, strict=True))
             ask(session.operator, PoseArm(text, (a, b, c, d, e, f)), sensor.idle)
-            reading = steady(*sensor.collect(WEIGH_S))
+            reading = steady(*_collected(session, sensor, WEIGH_S, "do not touch the arm"))
             poses.append(Pose(arm_joints(session.rig, session.folder), reading))
             sensor.idle()
         ask(session.operator, PoseArm("Move the arm back to the held pose", held), sensor.idle)
@@ -94,12 +94,19 @@ def measure_weight(session: Session) -> Estimate:
 
 def _tare(session: Session, sensor: SensorFeed) -> Steady:
     ask(session.operator, Rest(FREE), sensor.idle)
-    return steady(*sensor.collect(TARE_S))
+    return steady(*_collected(session, sensor, TARE_S, "keep everything still"))
 
 
 def _held(session: Session, sensor: SensorFeed, text: str, force_body_N: Vector3) -> Steady:
     ask(session.operator, Press(text, force_body_N, HOLD_S + SPARE_S), sensor.idle)
-    return steady(*sensor.collect(HOLD_S))
+    return steady(*_collected(session, sensor, HOLD_S, "keep the force"))
+
+
+def _collected(session: Session, sensor: SensorFeed, seconds: float, meanwhile: str) -> tuple[Array, Array]:
+    tell(f"measuring for {seconds:g} s: {meanwhile}")
+    times_s, values = sensor.collect(seconds)
+    session.raw.forces(times_s, values)
+    return times_s, values
 
 
 def _times(axis: Vector3, size: float) -> Vector3:

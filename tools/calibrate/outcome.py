@@ -6,23 +6,34 @@ import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from robot_io.errors import EnvironmentFault
 from robot_io.rig.calibration import Calibration
 from robot_io.rig.config import RigConfig
 from sim_backend.world.truth import true_frames
 from tools.calibrate.estimators.estimate import Estimate
+from tools.calibrate.raw import Raw
 from tools.places.apply_fragment import apply_fragment
+from tools.places.atomic_file import write_new
 from tools.places.fragment import Fragment, default_path, write_fragment
 from tools.rig import devices_at
 
 SCHEMA = 1
 
 
-def saved(found: Estimate, rig: RigConfig, out: Path | None, apply: Path | None) -> tuple[Path, Path | None]:
-    """Write the fragment and let the rig file `apply` include it; return the fragment and where the rig was kept.
+class Saved(NamedTuple):
+    """The fragment, the readings behind it (None where there are none of its own), and where the rig was kept."""
+
+    fragment: Path
+    readings: Path | None
+    kept: Path | None
+
+
+def saved(found: Estimate, rig: RigConfig, raw: Raw | None, out: Path | None, apply: Path | None) -> Saved:
+    """Write the fragment and its readings, and let the rig file `apply` include it.
 
     Raises UsageError, ConfigError and EnvironmentFault as these do.
     """
@@ -30,9 +41,21 @@ def saved(found: Estimate, rig: RigConfig, out: Path | None, apply: Path | None)
     uncertainty, residual = (tuple(map(_rounded, values)) for values in (found.uncertainty, found.residual))
     calibration = Calibration(made, _one_or_all(uncertainty), found.unit, _one_or_all(residual), found.source, rig.name)
     path = out or default_path(found.what, made)
-    keys = found.keys | (still_hidden(found, rig) if devices_at(rig, "emulated") else {})
+    keys = found.keys | ({} if devices_at(rig, "hardware") else still_hidden(found, rig))
     write_fragment(path, Fragment(found.what, keys, calibration, found.told))
-    return path, apply_fragment(apply, path) if apply is not None else None
+    readings = _write_readings(path.with_suffix(".csv"), raw) if raw is not None and not raw.empty else None
+    return Saved(path, readings, apply_fragment(apply, path) if apply is not None else None)
+
+
+def _write_readings(path: Path, raw: Raw) -> Path:
+    stem, count = path.stem, 2
+    while path.exists():  # somebody else's, or of a fragment that is gone
+        path, count = path.with_name(f"{stem}-{count}.csv"), count + 1
+    try:
+        write_new(path, raw.text().encode())
+    except OSError as error:
+        raise EnvironmentFault(f"the readings cannot be written: {error.strerror}", where=str(path)) from None
+    return path
 
 
 def still_hidden(found: Estimate, rig: RigConfig) -> dict[str, Any]:
@@ -51,8 +74,8 @@ def still_hidden(found: Estimate, rig: RigConfig) -> dict[str, Any]:
     return {}
 
 
-def as_json(found: Estimate, path: Path, logs: Sequence[Path]) -> dict[str, Any]:
-    """Return the object that `--json` prints."""
+def as_json(found: Estimate, written: Saved, logs: Sequence[Path]) -> dict[str, Any]:
+    """Return the object that `--json` prints; its log: the readings, or the logs that were read."""
     return {
         "schema": SCHEMA,
         "what": found.what,
@@ -60,23 +83,25 @@ def as_json(found: Estimate, path: Path, logs: Sequence[Path]) -> dict[str, Any]
         "uncertainty": _one_or_all(tuple(map(_rounded, found.uncertainty))),
         "unit": found.unit,
         "residual": _one_or_all(tuple(map(_rounded, found.residual))),
-        "file": str(path),
-        "log": [str(log) for log in logs] or None,
+        "file": str(written.fragment),
+        "log": [str(log) for log in logs] or (None if written.readings is None else str(written.readings)),
     }
 
 
-def lines(found: Estimate, path: Path, kept: Path | None, apply: Path | None) -> list[str]:
+def lines(found: Estimate, written: Saved, apply: Path | None) -> list[str]:
     """Return what people are told: each value with its uncertainty, then the rest."""
     units = found.unit.split(", ")
     told = [
         f"{found.what}: {value:+.4f} {unit} +- {uncertainty:.2g} (k = 2)"
         for value, uncertainty, unit in zip(found.value, found.uncertainty, units * len(found.value), strict=False)
     ]
-    told += [f"by {found.source}", *found.told, f"written to {path}"]
-    if kept is not None:
-        told.append(f"{apply} includes it now; as it was: {kept.name}")
+    told += [f"by {found.source}", *found.told, f"written to {written.fragment}"]
+    if written.kept is not None:
+        told.append(f"{apply} includes it now; as it was: {written.kept.name}")
     elif found.keys:
-        told.append(f'to use it, write include = ["{path}"] at the top of the rig, or add --apply RIG next time')
+        told.append(
+            f'to use it, write include = ["{written.fragment}"] at the top of the rig, or add --apply RIG next time'
+        )
     return told
 
 

@@ -68,6 +68,11 @@ def ask(operator: Operator, act: Act, idle: Callable[[], object] = lambda: None)
         time.sleep(POLL_S)
 
 
+def tell(text: str) -> None:
+    """Tell the operator what goes on."""
+    print(text, file=sys.stderr, flush=True)
+
+
 class Terminal:
     """A person at a terminal. Raises UsageError where stdin is none."""
 

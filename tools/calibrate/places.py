@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from robot_io.messages import BodyTwist
-from tools.calibrate.devices import direction_driven, hear_base
+from tools.calibrate.devices import BaseHeard, direction_driven, hear_base
 from tools.calibrate.estimators.contact import Sight, estimate_from_marker, estimate_from_plumb
 from tools.calibrate.estimators.estimate import Array, Estimate
 from tools.calibrate.estimators.line import estimate_line
 from tools.calibrate.estimators.marker import Straight, estimate_marker
 from tools.calibrate.estimators.mean_pose import MeanPose, mean_pose
-from tools.calibrate.people import Drive, Rest, ask
+from tools.calibrate.people import Done, Drive, Rest, ask
 from tools.calibrate.session import Session
 
 STAND_S = 3.0
@@ -27,7 +27,7 @@ QUARTER = ((BodyTwist(0.0, 0.0, 0.4), 4.5), (BodyTwist(), 1.0))
 def measure_contact_by_marker(session: Session) -> Estimate:
     """Return the ball's centre by the marker on it that `base.topics.ball_pose` tells of."""
     ask(session.operator, Rest(f"{STILL}, with the marker on the ball in sight"))
-    heard = hear_base(session.rig, STAND_S, other=session.rig.base.topics.ball_pose)
+    heard = _heard(session, STAND_S, other=session.rig.base.topics.ball_pose)
     ball = mean_pose(heard.other, "the ball")
     sight = Sight(mean_pose(heard.base), (ball.pose.x, ball.pose.y), ball.place_error_m)
     return estimate_from_marker([sight], session.rig.frames.contact_in_base_m)
@@ -53,11 +53,11 @@ def measure_marker(session: Session) -> Estimate:
     ask(session.operator, Rest(STILL))
     before = _stood(session, markers=True)
     straight = Drive("Drive straight ahead or straight back by 1.5 m with the joystick, and let it stand", BACK)
-    driven = hear_base(session.rig, 0.5, markers=True, until=session.operator.begin(straight))
+    driven = _heard(session, 0.5, markers=True, until=session.operator.begin(straight))
     direction, error = direction_driven(driven)
     after = _stood(session, markers=True)
     turn = Drive("Turn the base once around on the spot with the joystick, and let it stand", ROUND)
-    turned = hear_base(session.rig, 0.5, markers=True, until=session.operator.begin(turn))
+    turned = _heard(session, 0.5, markers=True, until=session.operator.begin(turn))
     return estimate_marker(
         Straight(before, after, direction, error), while_turning(turned.base), session.rig.frames.base_from_marker
     )
@@ -82,4 +82,14 @@ def measure_path(session: Session, *, two_places: bool) -> Estimate:
 
 
 def _stood(session: Session, *, markers: bool = False) -> MeanPose:
-    return mean_pose(hear_base(session.rig, STAND_S, markers=markers).base)
+    return mean_pose(_heard(session, STAND_S, markers=markers).base)
+
+
+def _heard(
+    session: Session, seconds: float, *, markers: bool = False, other: str = "", until: Done | None = None
+) -> BaseHeard:
+    heard = hear_base(session.rig, seconds, markers=markers, other=other, until=until)
+    for poses in (heard.base, heard.other):
+        if len(poses):
+            session.raw.poses(poses)
+    return heard

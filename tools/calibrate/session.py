@@ -9,6 +9,7 @@ from typing import NamedTuple
 from robot_io.errors import UsageError
 from robot_io.rig.config import RigConfig
 from tools.calibrate.people import Operator, Terminal
+from tools.calibrate.raw import Raw
 from tools.calibrate.rehearsal import Rehearsed, emulators
 from tools.places.device_locks import DeviceLocks
 from tools.rig import devices_at, folder_of
@@ -23,6 +24,8 @@ class Session(NamedTuple):
     rig: RigConfig
     folder: str
     operator: Operator
+    raw: Raw
+    """Takes what is read."""
 
 
 @contextlib.contextmanager
@@ -39,10 +42,10 @@ def open_session(
     with DeviceLocks(rig), contextlib.ExitStack() as opened:
         if devices_at(rig, "emulated"):
             rig, served = opened.enter_context(emulators(rig, rig_name, overrides, rehearsal or 0))
-            yield Session(rig, folder_of(rig_name), person or Rehearsed(rig, served, rehearsal or 0))
+            yield Session(rig, folder_of(rig_name), person or Rehearsed(rig, served, rehearsal or 0), Raw())
         else:
             assert person is not None
-            yield Session(rig, folder_of(rig_name), person)
+            yield Session(rig, folder_of(rig_name), person, Raw())
 
 
 def _check(rig: RigConfig, what: str, rehearsal: int | None) -> None:

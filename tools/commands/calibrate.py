@@ -90,18 +90,19 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None and args.out.exists():
         raise UsageError("there is a file of this name already", where=str(args.out), do="Give another `--out`")
     logs = getattr(args, "logs", None) or []
+    raw = None
     if logs:
         found = measure_from_logs(rig, logs)
     else:
         rehearsal = args.seed if args.rehearse else None
         with open_session(rig, args.rig, args.overrides, what=args.what, rehearsal=rehearsal) as here:
-            found = measure(args, here)
-    path, kept = saved(found, rig, args.out, args.apply)
+            found, raw = measure(args, here), here.raw
+    written = saved(found, rig, raw, args.out, args.apply)
     with ignoring_output_errors():
         if args.json:
-            say_json(as_json(found, path, logs))
+            say_json(as_json(found, written, logs))
         else:
-            print("\n".join(lines(found, path, kept, args.apply)))
+            print("\n".join(lines(found, written, args.apply)))
     return 0
 
 

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from tests.tools.calibrate.feeds import SEEDS, keeps_its_promise, reading, rot
+from tests.tools.calibrate.feeds import SEEDS, keeps_its_promise, reading, rot, wrench
 from tools.calibrate.estimators.cord import Pull, check_directions, estimate_yaw
 from tools.calibrate.estimators.estimate import CannotCalibrate
 from tools.calibrate.estimators.sign import estimate_sign
+from tools.calibrate.estimators.steady import steady
 from tools.calibrate.estimators.ur10_rotation import base_from_flange
 from tools.calibrate.estimators.weight import Pose, estimate_mounting
 
@@ -67,6 +68,16 @@ def test_a_tare_that_is_off_cancels_where_the_directions_lie_all_round():
 def test_pulls_that_say_nothing_are_refused(changes, words):
     with pytest.raises(CannotCalibrate, match=words):
         cord(6, 0.0, **changes)
+
+
+def test_a_cord_let_go_too_early_is_refused():
+    dice, mounting = np.random.default_rng(9), np.array(RIG)
+    pulls = [pull(dice, mounting, mark, 0.0) for mark in (0.0, 120.0, 240.0)]
+    times, values = wrench(dice, 3)
+    values[:240, :3] += felt(mounting, (25.0, 0.0, 0.0))  # the last 0.6 s are without
+    pulls[0] = pulls[0]._replace(reading=steady(times, values))
+    with pytest.raises(CannotCalibrate, match="at 0 degrees was not held while measured"):
+        estimate_yaw(pulls, reading(dice, 5), reading(dice, 5), RIG, 0.3)
 
 
 def test_directions_too_few_one_sided_or_contradicting_are_refused():

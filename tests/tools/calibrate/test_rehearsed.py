@@ -44,6 +44,9 @@ def calibrated(folder, what, *flags, seed=SEED):
     assert told["what"] == what
     fragment = tomllib.loads((folder / told["file"]).read_text())
     assert fragment["calibration"][what]["rig"] == "hidden"
+    readings = (folder / told["log"]).read_text().splitlines()
+    assert readings[0].startswith("step,t_s,fx_N")
+    assert len(readings) > 200
     return told, fragment
 
 

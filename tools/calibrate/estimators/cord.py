@@ -15,7 +15,7 @@ import numpy as np
 from robot_io.geometry import wrap_angle
 from robot_io.rig.types import Matrix3
 from tools.calibrate.estimators.estimate import Array, CannotCalibrate, Estimate, K, rows_of, turned_about_vertical
-from tools.calibrate.estimators.steady import Steady
+from tools.calibrate.estimators.steady import Steady, was_held
 
 FEWEST = 3
 LEAST_N = 8.0
@@ -101,6 +101,8 @@ def _force(pull: Pull, i: int, count: int, before: Steady, after: Steady, rotati
     level, where = math.hypot(force[0], force[1]), f"the pull at {pull.angle_deg:g} degrees"
     if level < LEAST_N:
         raise CannotCalibrate(f"{where} gave {level:.1f} N, at least {LEAST_N:g} N are needed", do="Pull harder")
+    if not was_held(pull.reading, force):
+        raise CannotCalibrate(f"{where} was not held while measured", do="Keep the cord taut until told to go on")
     if abs(force[2]) > STEEPEST * level:
         raise CannotCalibrate(
             f"{where} is not level: {force[2]:+.1f} N upwards beside {level:.1f} N", do="Pull at the ball's height"

@@ -15,7 +15,7 @@ import numpy as np
 from robot_io.messages import Vector3
 from robot_io.rig.types import Matrix3
 from tools.calibrate.estimators.estimate import Array, CannotCalibrate, Estimate, angle_between_deg, rows_of
-from tools.calibrate.estimators.steady import Steady
+from tools.calibrate.estimators.steady import Steady, was_held
 
 DIRECTIONS: dict[str, Vector3] = {"forward": (1.0, 0.0, 0.0), "left": (0.0, 1.0, 0.0), "up": (0.0, 0.0, 1.0)}
 """What is asked for, in BODY."""
@@ -43,7 +43,7 @@ def estimate_sign(presses: Mapping[str, Steady], tare: Steady, base_from_sensor:
     """
     now = np.array(base_from_sensor)
     names = tuple(DIRECTIONS)
-    felt = np.array([_direction(name, presses[name].mean[:3] - tare.mean[:3]) for name in names])
+    felt = np.array([_direction(name, presses[name], tare) for name in names])
     asked = np.array([DIRECTIONS[name] for name in names])
     for (a, one), (b, other) in itertools.combinations(zip(names, felt, strict=True), 2):
         if abs(float(one @ other)) > np.cos(np.radians(APART_DEG)):
@@ -84,13 +84,16 @@ def _fit(rotation: Array, felt: Array, asked: Array) -> Fit:
     return Fit(rotation, float(off.max()), float(off.mean()))
 
 
-def _direction(name: str, force: Array) -> Array:
+def _direction(name: str, reading: Steady, tare: Steady) -> Array:
+    force = reading.mean[:3] - tare.mean[:3]
     size = float(np.linalg.norm(force))
     if size < LEAST_N:
         raise CannotCalibrate(
             f"pressing {name} gave {size:.1f} N, at least {LEAST_N:g} N are needed",
             do="Press harder, and keep pressing",
         )
+    if not was_held(reading, force):
+        raise CannotCalibrate(f"{name} was not pressed all the while", do="Keep pressing until told to go on")
     return np.asarray(force / size)
 
 

@@ -17,6 +17,8 @@ from tools.calibrate.estimators.estimate import Array, CannotCalibrate
 
 BLOCKS = 20
 SMALLEST_COUNT = 10 * BLOCKS
+LET_GO = 0.5
+"""A force that changes by this share of itself was not held."""
 STANDS_OUT = 6.0
 """A block further from the trend than this many standard deviations of a block was touched."""
 
@@ -66,6 +68,13 @@ def steady(times_s: Array, values: Array, least: int = SMALLEST_COUNT) -> Steady
     factor = max(1.0, float(np.mean(blocks.var(axis=0, ddof=2) / alone)))
     error = sd * np.sqrt(factor / count)
     return Steady(mean, error, slope, sd * np.sqrt(factor / spread), sd, blocks, count, float(times_s[-1] - times_s[0]))
+
+
+def was_held(found: Steady, force: Array) -> bool:
+    """Return whether a force (N, beside the tare) lasted: a hand may tremble, but not let go or come late."""
+    size = float(np.linalg.norm(force))
+    trend = float(np.linalg.norm(found.drift_per_s[:3])) * found.span_s
+    return max(trend, float(np.linalg.norm(found.blocks[:, :3], axis=1).max())) < LET_GO * size
 
 
 def stands_out(found: Steady, floor: Array) -> int | None:
