@@ -13,7 +13,8 @@ from tools.run.lockstep import Lockstep
 
 TURNED_DEG = 1.0
 BIAS_N = 0.12
-AFTER_TARE_S = 1.6
+AFTER_TARE_S = 0.6
+"""The error of the tare comes this long after it would have ended at the earliest, before the contact."""
 
 
 class Course(NamedTuple):
@@ -43,7 +44,7 @@ def push(law: str, seed: int, distance_m: float = 20.0, settings: tuple[str, ...
     rig = resolve_rig("sim", [f"control.law={law}", f"control.distance_m={distance_m}", error, *settings])
     rows = rig.frames.base_from_sensor
     lateral = tuple(rows[1][i] * bias for i in range(3))  # along BODY y, in the SENSOR frame
-    word = f"ft.wrong={','.join(f'{value:.4f}' for value in lateral)} at {AFTER_TARE_S} s"
+    word = f"ft.wrong={','.join(f'{value:.4f}' for value in lateral)} at {rig.ft.tare_s + AFTER_TARE_S:.1f} s"
     rig = replace(rig, faults=replace(rig.faults, inject=(word,)))
     run = Lockstep(rig, seed, _NoLog())
     at_6_m = [math.nan]
