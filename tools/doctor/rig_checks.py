@@ -6,6 +6,7 @@ import time
 
 from robot_io.errors import PushError, UsageError
 from robot_io.rig.config import RigConfig
+from robot_io.rig.world import TruthConfig
 from safety.faults import FAULTS
 from safety.stopping import stopping
 from safety.workspace import SPARE_AHEAD_M, SPARE_AROUND_M, WorkspaceSettings
@@ -89,7 +90,7 @@ def _gains(rows: Rows, rig: RigConfig) -> None:
 
 
 def _calibration(rows: Rows, rig: RigConfig) -> None:
-    if devices_at(rig, "sim"):
+    if devices_at(rig, "sim") and rig.world.truth == TruthConfig():
         rows.skip("calibration-age", "the frames of level sim are exact")
         return
     age, limit = calibration_age(rig, time.time()), rig.calibration.max_age_days

@@ -161,11 +161,11 @@ def _keep(path: Path) -> Path:
 def _check_usable(rig_path: Path, text: str, fragment_path: Path) -> None:
     """Raise ConfigError unless the rig can be used with this text, and nothing but the fragment's keys changes."""
     trial = rig_path.with_name(f".{rig_path.stem}.{os.getpid()}.trial.toml")
-    fragment = files.read_fragment(fragment_path)
+    fragment, before = files.read_fragment(fragment_path), _values(files.read(rig_path))
     try:
         trial.write_text(text, encoding="utf-8", newline="")
         resolve_rig(trial)
-        before, after = _values(files.read(rig_path)), _values(files.read(trial))
+        after = _values(files.read(trial))
     except OSError as error:
         raise EnvironmentFault(f"the rig cannot be edited: {error.strerror}", where=str(rig_path)) from None
     except ConfigError as error:

@@ -27,7 +27,7 @@ OPEN_LOOP_FAILS_M = 2.0
 GREATEST_EDGE_OFFSET_M = 0.07
 """Maximum distance of the pusher's start from the middle of the slider's side; starts are spread evenly over the runs.
 
-The paper gives no value. Chosen for the result: from 0.08 m on, two of the box's ten pushes reach 0.51 m, just
+The paper gives no value. Chosen for the result: at 0.08 m, one of the box's ten pushes reaches 0.51 m, just
 outside the corridor.
 """
 GREATEST_LATERAL_M = 0.05

@@ -120,6 +120,11 @@ def age_row(*settings):
     return by_name(rig_checks(resolve_rig("emulated", settings)))["rig.calibration-age"]
 
 
+@pytest.mark.parametrize(("truth", "result"), [([], "skipped"), (["world.truth.sensor_yaw_deg=3"], "warning")])
+def test_at_level_sim_the_frames_are_exact_unless_the_world_errs(truth, result):
+    assert by_name(rig_checks(resolve_rig("sim", truth)))["rig.calibration-age"].result == result
+
+
 def test_the_calibrations_that_are_missing_or_old_are_named():
     both = age_row()
     assert both.evidence == "never calibrated: the sensor's frame and the contact point"

@@ -156,6 +156,14 @@ def test_a_rig_that_could_not_be_used_afterwards_stays_as_it_is(put):
     assert "cannot read it" in refused(ConfigError, rig, rig.parent / "none.toml", RIG)
 
 
+def test_a_rig_that_could_not_be_used_before_says_why(put):
+    fragment, text = put("contact.toml", FRAGMENT), RIG.replace("name =", 'include = ["contact.toml"]\nname =')
+    rig = put("rig.toml", text)
+    assert f"{rig}:8: `frames.contact_in_base_m` is also set at {fragment}:2" in refused(
+        ConfigError, rig, fragment, text
+    )
+
+
 def test_what_has_no_line_of_its_own_is_left_to_the_person(put):
     text = RIG.partition("[frames]")[0] + "frames = { contact_in_base_m = [1.0, 0.0, 0.15] }\n"
     rig = put("rig.toml", text)

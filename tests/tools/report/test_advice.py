@@ -85,6 +85,12 @@ def test_a_push_too_short_has_no_angle(run):
     assert force_angle(pushed(run, 0.8, aside_deg=3.0)) is None
 
 
+def test_the_closed_forms_are_not_applied_to_other_laws(run):
+    other = pushed(run, 18.0, aside_deg=3.0, end_m=-0.33)
+    other.rig = but(other.rig, control=but(other.rig.control, law="force-integral"))
+    assert what_to_try(other, DONE) == []
+
+
 def test_a_fault_brings_the_next_step_of_its_page(run):
     stopped = Verdict("Safety stop", "", False, (), "F50-stop", "safety stop")
     lines = what_to_try(pushed(run, 6.0), stopped)

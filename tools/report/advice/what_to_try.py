@@ -56,6 +56,8 @@ def what_to_try(run: RunData, verdict: Verdict) -> list[str]:
 def _of_the_line(run: RunData, missed: bool) -> list[str]:
     """Return what the end of the push says of sensor and tare, and what that costs beside the line."""
     control = run.rig.control
+    if control.law != "force":
+        return []  # the closed forms are those of the paper's law
     angle = force_angle(run)
     if angle is None or run.last is None:
         return ["Push further: this push was too short to settle on its line."] if missed else []
