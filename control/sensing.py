@@ -81,7 +81,7 @@ def counted(state: ControlState) -> int:
 
 
 def _sum_up(settings: Settings, state: ControlState, readings: tuple[FtReading, ...]) -> tuple[TareSums, ...]:
-    wanted = settings.tare_readings
+    wanted = settings.check_readings if state.phase == Phase.CHECK else settings.tare_readings
     sums = state.tare[0] if state.tare else TareSums()
     for reading in readings:
         if sums.count < wanted and reading.received_ns > state.phase_since_ns:

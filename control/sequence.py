@@ -274,10 +274,10 @@ def _retreat(settings: Settings, state: ControlState, inp: TickInput, contact: t
 
 
 def _check(settings: Settings, state: ControlState, inp: TickInput) -> ControlState:
-    """Compare the tare with the mean of as many readings, taken at rest again."""
+    """Compare the tare with the mean of readings taken at rest again."""
     if not _rested(state, inp.now_ns, REST_NS):
         return replace(state, speed=0.0, tare=())
-    if counted(state) < settings.tare_readings:
+    if counted(state) < settings.check_readings:
         return state
     mean = judge_tare(settings, state).tare.bias
     return _enter(state, Phase.DONE, inp.now_ns, residual_N=math.dist(mean[:3], state.bias_force))

@@ -15,6 +15,8 @@ from robot_io.rig.types import Matrix3
 
 CONTACT_RATE_HZ = 100.0
 """`contact_samples` counts readings at this rate."""
+CHECK_S = 1.0
+"""The limit of the residual is newtons, far above the uncertainty of the mean of 1 s."""
 SETTLE_S = 0.2
 
 
@@ -41,6 +43,8 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
     """Period of the loop, s."""
     tare_readings: int
     """How many readings a tare needs, at the sensor's declared rate."""
+    check_readings: int
+    """How many of them are enough to see, after the push, whether the sensor still reads zero."""
     settle_readings: int
     """How many readings the sensor must have sent before the run starts."""
     contact_readings: int
@@ -67,6 +71,7 @@ class Settings(msgspec.Struct, frozen=True, gc=False):
             max(rig.control.ramp_s, rig.control.push_speed_m_per_s / rig.limits.max_acceleration_m_per_s2),
             1.0 / rig.loop.rate_hz,
             round(rig.ft.declared.rate_hz * rig.ft.tare_s),
+            round(rig.ft.declared.rate_hz * min(rig.ft.tare_s, CHECK_S)),
             max(SMALLEST_COUNT, round(SETTLE_S * rig.ft.declared.rate_hz)),
             max(1, round(rig.control.contact_samples * rig.ft.declared.rate_hz / CONTACT_RATE_HZ)),
             in_contact,

@@ -30,6 +30,12 @@ OFFENCES = {
         "threading, tools.run",
         {"no asyncio, no threads, no multiprocessing of ours", "the rooms of tools"},
     ),
+    "tools/calibrate/estimators": (
+        "tools.calibrate.session",
+        {
+            "the rooms of tools.calibrate: estimators know neither devices nor people",
+        },
+    ),
     "tools/report/drawing": (
         "tools.report.page",
         {

@@ -16,7 +16,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"matplotlib", "scipy", "numba", "numpy", "osqp", "joblib"}
 STAND_IN = "__version__ = '0.10.2'  # of python-control\n"
-NAME_TO_INSTALL = {"serial": "pyserial", "rtde_receive": "ur-rtde", "rtde_control": "ur-rtde"}
+NAME_TO_INSTALL = {
+    "serial": "pyserial",
+    "rtde_receive": "ur-rtde",
+    "rtde_control": "ur-rtde",
+    "PIL": "pillow",
+    "foxglove": "foxglove-sdk",
+}
 """Where it is not the name to import."""
 
 
@@ -81,11 +87,13 @@ def test_the_extra_app_is_what_the_application_imports_besides():
     ours = {"robot_io", "control", "safety", "sim_backend", "tools"}
     names = set(imported_by(*(ours - {"robot_io"}))) - sys.stdlib_module_names - ours
     requirements = metadata.requires("single-point-push")
-    for_studies = {"numba", "distributed"}
+    for_studies, for_viewers = {"numba", "distributed"}, {"foxglove-sdk"}
     with_osqp = {"scipy"}
-    besides = names - needed(requirements) - for_studies - with_osqp
+    names = {NAME_TO_INSTALL.get(name, name) for name in names}
+    besides = names - needed(requirements) - for_studies - for_viewers - with_osqp
     assert besides == needed(requirements, "app")
     assert for_studies <= needed(requirements, "cluster")
+    assert for_viewers <= needed(requirements, "live")
 
 
 @pytest.fixture

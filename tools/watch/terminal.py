@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import signal
 import sys
 import termios
@@ -104,11 +103,11 @@ class Terminal:
     @staticmethod
     def columns() -> int:
         """Return the width of the terminal as it is now."""
-        return shutil.get_terminal_size((COLUMNS, ROWS)).columns
+        return _size().columns
 
     def draw(self, lines: list[Line]) -> None:
         """Draw the picture over the last one; what does not fit below the last row is left out."""
-        rows = shutil.get_terminal_size((COLUMNS, ROWS)).lines
+        rows = _size().lines
         styles = _STYLES if self._colour else _PLAIN_STYLES
         shown = [f"{styles[style]}{text}\x1b[0m" if style in styles else text for text, style in lines[:rows]]
         self._write("\x1b[H" + "\x1b[K\n".join(shown) + "\x1b[K\x1b[J")
@@ -118,6 +117,15 @@ class Terminal:
         with contextlib.suppress(OSError, ValueError):  # the terminal is closed; SIGHUP arrives as well
             sys.stdout.write(text)
             sys.stdout.flush()
+
+
+def _size() -> os.terminal_size:
+    """Return what the terminal itself says: COLUMNS and LINES of the environment do not follow a resize."""
+    try:
+        size = os.get_terminal_size(sys.stdout.fileno())
+    except (OSError, ValueError):  # it was closed
+        return os.terminal_size((COLUMNS, ROWS))
+    return size if size.columns and size.lines else os.terminal_size((COLUMNS, ROWS))
 
 
 def _note(_number: int, _frame: FrameType | None) -> None:

@@ -25,7 +25,7 @@ def test_bench_sim_measures_the_whole_process_and_its_parts(monkeypatch, capsys)
     )
     assert figures["write_ns_per_tick"] > 1000.0
     assert figures["simulate_ns_per_tick"] > figures["fold_ns_per_tick"] + figures["encode_ns_per_tick"]
-    assert 600 < figures["ticks"] < 900
+    assert 1000 < figures["ticks"] < 1300
     assert "times_real_time_by_cpu" in err
 
 

@@ -196,7 +196,7 @@ def strip(line):
 
 
 def test_it_survives_a_resize_and_gives_the_terminal_back(state):
-    screen = Screen(state, 100, LANG="C.UTF-8", PYTHONUTF8="1")
+    screen = Screen(state, 100, LANG="C.UTF-8", PYTHONUTF8="1", COLUMNS="80")  # some shells export it
     wait_until(lambda: any(line.startswith("BODY ") for line in screen.frame()), "the force is shown", 30.0)
     assert screen.read().startswith(ALTERNATE)
     assert any(line.startswith("base") for line in screen.frame())
