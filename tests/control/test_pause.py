@@ -215,6 +215,7 @@ def test_a_base_that_creeps_while_it_is_paused_is_stopped():
 # --- a whole push in the world -----------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_push_with_many_pauses_reaches_its_end_as_without():
     """Ten pauses, six of ten seconds and one of five minutes: no fault, no loss, no resume, and the same end."""
     plain, broken = ClosedLoop(("control.distance_m=1.0",)), ClosedLoop(("control.distance_m=1.0",))

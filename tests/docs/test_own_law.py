@@ -108,6 +108,7 @@ def test_its_settings_are_checked_and_logged(push, folder):
     assert control["law_facts"]["name"] == "steady"
 
 
+@pytest.mark.long
 def test_an_emulated_run_replays_and_lets_the_law_move_a_robot(push, folder, tmp_path, monkeypatch):
     done = push(folder, "run", "emulated", "--law", LAW, "--distance-m", "0.2", "--out", "emulated", "--json", *QUICK)
     assert (done.code, done.last_object["verdict"]) == (0, "done"), done.err

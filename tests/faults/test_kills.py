@@ -118,6 +118,7 @@ def test_arm_frozen(state, tmp_path, host):
     replays(found.folder)
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_recorder_killed(state, tmp_path, host):
     """Nobody is in danger: the push goes on for a second, then the base holds; what was flushed can be recovered."""

@@ -158,6 +158,7 @@ def test_the_log_s_own_value_changes_nothing(sim_log, capsys):
     assert (told["new_faults"], told["missing_faults"], told["not_run"], told["notes"]) == ([], [], 0, [])
 
 
+@pytest.mark.long
 def test_a_log_of_the_wall_clock_is_answered_too(emulated_run, capsys):
     log = emulated_run / "run.mcap"
     own = what_if(capsys, log, "control.k_f=0.3")

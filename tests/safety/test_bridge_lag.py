@@ -199,6 +199,7 @@ def test_on_the_wire(tmp_path):
         assert 60 * MS < gate.link.read().lag_ns < 130 * MS
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_a_robots_clock_set_back_by_a_quarter_of_a_second_is_told_to_control_on_the_wire(tmp_path):
     """As a time server does that steps instead of slewing; F32-stop is above 120 ms."""

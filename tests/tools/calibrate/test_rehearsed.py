@@ -50,6 +50,7 @@ def calibrated(folder, what, *flags, seed=SEED):
     return told, fragment
 
 
+@pytest.mark.long
 def test_the_path_is_where_the_base_stands(folder):
     told, fragment = calibrated(folder, "path", "--set", "world.truth.marker_offset=[0,0,0]")
     x, y, degrees = told["value"]

@@ -112,6 +112,7 @@ def test_killed_it_leaves_no_process_and_no_stream_behind_and_meanwhile_no_run_s
         assert not sensor.ask("counters")["streaming"]
 
 
+@pytest.mark.long
 def test_where_there_is_no_terminal_it_prints_lines_and_shows_the_hands_of_the_rig(state):
     hand = "world.hand=[{at_s = 6.0, for_s = 60.0, force_body_N = [0.0, 12.0, 0.0]}]"
     with started(state, "watch", "emulated", "--set", hand) as watch:
@@ -221,6 +222,7 @@ def test_keys_that_signal_end_it_too(state, key):
     assert b"\x1b[1;7m" in screen.shown
 
 
+@pytest.mark.long
 def test_a_simulated_run_is_watched_through_its_log(state, tmp_path):
     argv = ("run", "sim", "--distance-m", "0.6", "--out", str(tmp_path / "out"), *QUICK)
     with started(state, *argv) as run:

@@ -92,7 +92,19 @@ def test_level_sim_imports_no_figures_solvers_or_wires(tmp_path):
 
 def test_the_operators_stop_ends_a_paced_run_with_130_and_a_whole_log(tmp_path):
     out = tmp_path / "run"
-    words = [sys.executable, "-c", PUSH, "run", "sim", "--out", str(out), "--no-report", "--json"]
+    words = [
+        sys.executable,
+        "-c",
+        PUSH,
+        "run",
+        "sim",
+        "--set",
+        "ft.tare_s=1",
+        "--out",
+        str(out),
+        "--no-report",
+        "--json",
+    ]
     environment = os.environ | {"XDG_STATE_HOME": str(tmp_path), "PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(
         words, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -29,6 +29,7 @@ def push(host):
     return partial(pushed, host=host)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", ["arm=own_devices:Arm", "base=own_devices:Base"])
 def test_a_push_with_an_arm_or_base_of_ones_own_replays(push, folder, device):
     name, _, kind = device.partition("=")
