@@ -93,7 +93,7 @@ def readme_commands():
 def test_readme_shell_blocks_run(tmp_path, shortened):
     """Every command of the README in order, in an empty folder; make targets are looked up, not run again.
 
-    shortened: whether pushes with the wall clock get a quick approach and tare, and end after 10 cm.
+    shortened: whether pushes with the wall clock get a quick approach and tare and end after 10 cm; others, 30 cm.
     """
     environment = os.environ | {
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
@@ -108,6 +108,8 @@ def test_readme_shell_blocks_run(tmp_path, shortened):
                 continue
             if shortened and re.match(r"push run (?!sim|thing)", command):
                 command = shlex.join([*re.sub(r"--distance-m \S+", "--distance-m 0.1", command).split(), *QUICK])
+            if shortened and re.match(r"push run sim", command):
+                command = re.sub(r"--distance-m \S+", "--distance-m 0.3", command)
             began_ns = time.monotonic_ns()
             done = subprocess.run(
                 ["bash", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=80,

@@ -285,6 +285,7 @@ def test_another_client_of_the_bridge_is_no_listener():
             pass
 
 
+@pytest.mark.long
 def test_a_silent_topic_is_named():
     """A topic that speaks once a second is waited for 4 s; connecting to a bridge that answers takes no second."""
     topics = TopicsConfig(base_pose="/vicon/Nobody/Nobody")
@@ -326,6 +327,7 @@ def test_plain_slashes_and_naggling_server():
         assert gather_until(base, CommandEcho, FORWARD).value == CommandEcho(FORWARD)
 
 
+@pytest.mark.long
 def test_a_naggling_server_is_not_kept_waiting():
     """Acknowledged late, its next message would wait: some twenty in two seconds for more than 40 ms (measured)."""
     with running_bridge(bridge={"nagle": True}) as bridge, Ridgeback(bridge.url, topics=QUICK) as base:

@@ -61,6 +61,7 @@ def test_a_bridge_that_falls_silent_is_given_up_although_nothing_is_commanded(br
         assert base.health().cause == "no message from the bridge for 0.3 s"
 
 
+@pytest.mark.long
 def test_a_frozen_bridge_gives_the_base_nothing_old_to_move_by(bridge: Bridge):
     """It has commands in hand when it freezes, and delivers them when it goes on: zeros follow at once."""
     base = Ridgeback(bridge.url, topics=TOPICS)

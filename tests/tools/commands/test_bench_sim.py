@@ -11,6 +11,7 @@ from tools.cli import main
 from tools.commands import bench_sim
 
 
+@pytest.mark.long
 def test_bench_sim_measures_the_whole_process_and_its_parts(monkeypatch, capsys):
     monkeypatch.setattr(bench_sim, "ROUNDS", 1)
     monkeypatch.setattr(bench_sim, "PARTS_DISTANCE_M", 0.1)

@@ -54,6 +54,7 @@ def test_a_failed_check_refuses(state, tmp_path):
     assert not out.exists()
 
 
+@pytest.mark.long
 def test_rows_of_a_device_that_a_run_holds_are_skipped_and_say_by_whom(state, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(state))
     with robot(tmp_path, devices=["arm"]) as rig, DeviceLocks(resolve_rig(rig)):

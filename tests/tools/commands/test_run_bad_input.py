@@ -220,6 +220,7 @@ def test_every_device_that_is_not_there_is_named(state, tmp_path):
         assert re.search(rf"^{device} +hardware", ended.err, re.MULTILINE), "announced before anything is opened"
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_a_sensor_that_already_streams_and_never_changes_is_read_and_refused_as_dead(state, tmp_path, host):
     """Left streaming by a client that crashed, it works; but no real sensor repeats itself, whatever a rig says."""

@@ -306,6 +306,7 @@ def test_on_a_terminal_a_key_stops(state, tmp_path, host):
     terminal.close()
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_a_closed_terminal_is_a_clean_stop(state, tmp_path, host):
     """The window is closed, or the connection of a remote login breaks: SIGHUP for all of the launcher's group, and

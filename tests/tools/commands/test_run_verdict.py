@@ -72,6 +72,7 @@ def test_a_push_that_ends_off_its_line_is_not_done(tmp_path):
     assert end["text"] in page
 
 
+@pytest.mark.long
 def test_a_wider_tolerance_of_the_rig_lets_the_same_push_be_done(tmp_path):
     words = ("--set", "goal.end_tolerance_m=1.0", "--set", "goal.corridor_m=1.0", "--no-report")
     code, summary, _ = ran(tmp_path, *TURNED, *words, "--distance-m", "4")

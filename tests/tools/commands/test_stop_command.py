@@ -44,6 +44,7 @@ def test_a_run_under_way_is_stopped(state, tmp_path, host, asked):
     assert stands(world_of(tmp_path / "run" / "run.mcap")[1][-1][1])
 
 
+@pytest.mark.long
 def test_a_simulated_run_is_stopped_too(state, tmp_path):
     with started(state, "run", "sim", *QUICK, "--distance-m", "3", "--out", str(tmp_path / "run")) as run:
         run.wait_for("PUSH ")

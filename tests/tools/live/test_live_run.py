@@ -12,6 +12,7 @@ from tests.tools.live.viewer import Viewer, free_port
 from tests.wire.ur_process import wait_until
 
 
+@pytest.mark.long
 def test_a_viewer_sees_a_simulated_run_whose_log_is_the_same_without_it(state, tmp_path):
     port = free_port()
     argv = ("run", "sim", "--distance-m", "0.1", *QUICK, "--out")

@@ -26,6 +26,7 @@ def test_a_gif_shows_the_push_four_times_as_fast(runs, tmp_path):
     assert shown_s == pytest.approx((run_s + 1.0) / 4.0 + 2.0, abs=0.7)  # the last frame stays for 2 s
 
 
+@pytest.mark.long
 def test_a_gif_that_is_too_large_shows_fewer_frames(runs, tmp_path, monkeypatch):
     main(["report", str(runs / "one"), "--gif", "--out", str(tmp_path / "all")])
     size = (tmp_path / "all" / "film.gif").stat().st_size

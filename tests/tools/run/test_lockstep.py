@@ -223,6 +223,7 @@ def test_pacing_keeps_the_rate_and_never_bursts_after_a_pause(monkeypatch):
     assert loop.waits_ns[1:] == [10_000_000] * 9
 
 
+@pytest.mark.long
 def test_a_paced_run_takes_as_long_as_it_says(tmp_path):
     began_s = time.monotonic()
     done = push("run", "sim", "--distance-m", "0.05", "--out", tmp_path / "run", *QUICK, state=tmp_path)

@@ -185,6 +185,7 @@ def test_what_a_driver_should_not_raise_names_the_driver(push, sensors, kind, co
     assert "defect of the program" not in done.err
 
 
+@pytest.mark.long
 def test_a_driver_that_raises_in_mid_push_stops_it_and_the_log_says_so(push, sensors):
     done = push(
         sensors, "run", "emulated", "--set", "ft.kind=sensors:Draining", "--distance-m", "2", "--out", "out", "--json",
