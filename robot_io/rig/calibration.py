@@ -28,6 +28,8 @@ class Calibration(Table, frozen=True):
     """What was measured: by which means, or from which logs."""
     rig: str = ""
     """Name of the rig on which it was made."""
+    unseen: str | None = None
+    """What this way of measuring cannot show, and is as before: `yaw` where the tool was weighed."""
 
 
 class CalibrationConfig(Table, frozen=True):

@@ -39,7 +39,15 @@ def saved(found: Estimate, rig: RigConfig, raw: Raw | None, out: Path | None, ap
     """
     made = datetime.now(UTC).replace(microsecond=0)
     uncertainty, residual = (tuple(map(_rounded, values)) for values in (found.uncertainty, found.residual))
-    calibration = Calibration(made, _one_or_all(uncertainty), found.unit, _one_or_all(residual), found.source, rig.name)
+    calibration = Calibration(
+        made,
+        _one_or_all(uncertainty),
+        found.unit,
+        _one_or_all(residual),
+        found.source,
+        rig.name,
+        found.unseen,
+    )
     path = out or default_path(found.what, made)
     keys = found.keys | ({} if devices_at(rig, "hardware") else still_hidden(found, rig))
     write_fragment(path, Fragment(found.what, keys, calibration, found.told))

@@ -43,5 +43,7 @@ def calibration_age(rig: RigConfig, now_s: float) -> CalibrationAge:
         for what, days in ages.items()
         if days < -AHEAD_DAYS
     ]
-    never = tuple(NAMES[what] for what in NEEDED if what not in ages)
-    return CalibrationAge(never, tuple(stale), max(ages.values()) if ages else None)
+    made = rig.calibration.made()
+    never = [NAMES[what] for what in NEEDED if what not in made]
+    never += [f"{NAMES[what]} in {made[what].unseen}" for what in NEEDED if what in made and made[what].unseen]
+    return CalibrationAge(tuple(never), tuple(stale), max(ages.values()) if ages else None)

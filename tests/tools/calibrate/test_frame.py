@@ -164,6 +164,7 @@ def test_thirty_weighings_find_the_tilt_within_their_uncertainty():
 
 def test_yaw_stays_as_the_rig_has_it_and_that_is_said():
     found = estimate_mounting(weighed(1, NOMINAL @ rot("z", 2.0)), HELD, RIG)  # z is forward: it rolls
+    assert found.unseen == "yaw"
     change = np.array(found.keys["frames.base_from_sensor"]) @ np.array(RIG).T
     assert change[1, 0] == pytest.approx(change[0, 1], abs=1e-6)  # no turn about the vertical
     assert found.value[0] == pytest.approx(2.0, abs=0.8)

@@ -132,6 +132,9 @@ def test_the_calibrations_that_are_missing_or_old_are_named():
     one = age_row(*aged(contact=3))
     assert one.evidence == "never calibrated: the sensor's frame"
     assert round(one.value, 3) == 3.0
+    tilt_only = age_row(*aged(frame=3, contact=3), "calibration.frame.unseen=yaw")  # the tool was weighed
+    assert tilt_only.result == "warning"
+    assert tilt_only.evidence == "never calibrated: the sensor's frame in yaw"
     old = age_row(*aged(frame=45, contact=3))
     assert old.evidence == "the sensor's frame was calibrated 45 days ago"
     assert round(old.value, 3) == 45.0

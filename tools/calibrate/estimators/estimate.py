@@ -30,6 +30,8 @@ class Estimate(msgspec.Struct, frozen=True):
     """The rig's keys that it sets, by dotted name; empty where the rig is right as it is."""
     told: tuple[str, ...] = ()
     """What else the operator should know, a sentence each."""
+    unseen: str | None = None
+    """What of the quantity stays unmeasured."""
 
 
 class CannotCalibrate(DeviceNotReady):

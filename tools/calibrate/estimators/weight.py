@@ -130,4 +130,5 @@ def _result(
             "yaw about the vertical is unseen and stays as the rig has it: gravity cannot show how the arm is turned "
             "on its base, nor can turning the base on a flat floor; `push calibrate frame --cord` measures it",
         ),
+        "yaw",
     )
