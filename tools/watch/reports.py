@@ -35,6 +35,7 @@ class RunReport(msgspec.Struct, frozen=True, tag=True):
     base: BaseRecord
     control: ControlState
     mode: int
+    paused: bool
     faults: tuple[str, ...]
 
 

@@ -113,7 +113,17 @@ class RunFollower:
         newest = ticks[-1]
         inp, out = newest.input, newest.output
         self._reports.send(
-            RunReport(inp.now_ns, readings, inp.ft.link, inp.arm, inp.base, newest.after.control, out.mode, out.faults)
+            RunReport(
+                inp.now_ns,
+                readings,
+                inp.ft.link,
+                inp.arm,
+                inp.base,
+                newest.after.control,
+                out.mode,
+                inp.paused,
+                out.faults,
+            )
         )
 
 

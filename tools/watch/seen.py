@@ -138,7 +138,8 @@ class Seen:
         if base.status_received_ns:
             self.status = base.status
             self.rates["status"].note(base.status_received_ns, base.status_received_ns)
-        self.stage = Stage(Phase(control.phase).name, Mode(report.mode).name, control.progress_m, report.faults)
+        mode = "PAUSED" if report.paused else Mode(report.mode).name
+        self.stage = Stage(Phase(control.phase).name, mode, control.progress_m, report.faults)
 
     def recent_forces(self) -> list[Vector3]:
         """Return the readings of the last MEAN_NS before the newest, N, SENSOR frame, bias still in them."""

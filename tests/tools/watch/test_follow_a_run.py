@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from robot_io.errors import LogDamaged
 from robot_io.messages import LinkState
@@ -95,3 +96,10 @@ def test_what_is_seen_of_a_run_has_the_ages_of_its_own_clock(follow, tmp_path):
     assert not told["base"]["pose_late"]
     assert {told[device]["state"] for device in ("ft", "arm", "base")} <= {LinkState.UP.name.lower(), "closed", "lost"}
     assert told["tare"] == "tared by the run"
+
+
+def test_a_pause_of_the_operator_is_told_from_a_hold_for_a_fault(follow, tmp_path):
+    _, reports = follow(GrowingRun(tmp_path / "run.mcap", GOLDEN.read_bytes(), 4))
+    seen = Seen(resolve_rig("emulated"))
+    seen.take_run(replace(reports[0], paused=True))
+    assert as_json(view_of(seen, "the run", now_ns=2**60))["run"]["mode"] == "PAUSED"
