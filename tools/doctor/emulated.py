@@ -115,11 +115,12 @@ def main() -> int:
     except PushError as error:
         status.error(error)
         return error.exit_code
+    addresses = addresses_of(opened)  # as a rig would name them: a fault may take a port away
     spoil(loop, opened, job.faults, rig)
     if job.hands_fd >= 0:
         Hands(loop, job.hands_fd, world, lambda words: print(words, file=sys.stderr))
     try_realtime(PRIORITY)
-    status.say("ready", addresses=addresses_of(opened))
+    status.say("ready", addresses=addresses)
     loop.run()  # SIGTERM ends the process: its ports and sockets go with it
     return 0
 
