@@ -5,6 +5,8 @@ from __future__ import annotations
 import fcntl
 import math
 import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from typing import cast
 
@@ -21,6 +23,10 @@ from sim_backend.world.plant import FtSource
 FOR_GOOD_S = 1e6
 GARBAGE_N = 100.0
 """What has no number cannot be sent on this wire: random ones up to this are."""
+
+OTHER_PROGRAM = "import os, sys; os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print(flush=True); sys.stdin.read()"
+_others: list[subprocess.Popen[bytes]] = []
+"""Their standard input stays open as long as this process lives."""
 
 
 def spoil_sensor(emulator: Ft300Emulator, faults: Sequence[WireFault], rig: RigConfig) -> None:
@@ -49,13 +55,23 @@ def _spoil_line(emulator: Ft300Emulator, fault: WireFault) -> bool:
         emulator.knobs = replace(knobs, corrupt_answer_every=every, **torn)
     elif kind == "echo":
         emulator.knobs = replace(knobs, echo=True)
-    elif kind in ("busy", "shared"):
+    elif kind == "busy":
         fd = os.open(emulator.port, os.O_RDWR | os.O_NOCTTY)  # stays open as long as this process
-        if kind == "busy":
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    elif kind == "shared":
+        _share(emulator.port)
     else:
         return False
     return True
+
+
+def _share(port: str) -> None:
+    """Let another program have the port open, without a lock, until this process ends."""
+    words = [sys.executable, "-c", OTHER_PROGRAM, port]
+    other = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert other.stdout is not None
+    other.stdout.readline()  # it is open
+    _others.append(other)
 
 
 class AlteredSource:
