@@ -22,6 +22,7 @@ UNITS = ("N", "N", "N", "N*m", "N*m", "N*m")
 NOISE_FACTOR = 2.0
 """Refuse a standard deviation above this many times the sensor's own noise."""
 DRIFT_STANDARD_ERRORS = 4.0
+"""Of a drift, if the noise were known: what white noise exceeds once in 16,000 times (4 sigma)."""
 DRIFT_FLOOR = (0.1, 0.1, 0.1, 0.005, 0.005, 0.005)
 """Drift (N, N*m) that is always allowed, too small to affect a push; the sensor's resolution if that is coarser."""
 BIAS_SHARE = 0.5
@@ -119,8 +120,8 @@ def judge(
     noise, sensor_range, resolution: the sensor's figures per axis (N, N*m); the noise is one standard deviation.
     scatters: as for `dead_axis`.
     Refused: a reading that is not finite, one that is not steady (standard deviation above twice the noise, or a drift
-    from the first to the last quarter beyond 4 standard errors and a small floor), a bias that leaves less than half of
-    the range, an axis that is dead.
+    from the first to the last quarter beyond what noise explains and a small floor), a bias that leaves less than half
+    of the range, an axis that is dead.
     """
     n, quarter = sums.count, sums.count // 4
     moments = [_mean_sd(sums.total[i], sums.squares[i], n) for i in range(6)]
@@ -139,7 +140,8 @@ def judge(
         mean_last, sd_last = _mean_sd(sums.last[i], sums.last_squares[i], quarter)
         # Noise is measured within the quarters: over all samples a drift would raise the noise and so hide itself.
         variance = (sd_first * sd_first + sd_last * sd_last) / 2
-        allowed = DRIFT_STANDARD_ERRORS * math.sqrt(2 * variance / quarter) + max(DRIFT_FLOOR[i], resolution[i])
+        errors = _standard_errors(2 * (quarter - 1))
+        allowed = errors * math.sqrt(2 * variance / quarter) + max(DRIFT_FLOOR[i], resolution[i])
         drift = mean_last - mean_first
         if not abs(drift) <= allowed:
             what = f"{name} is not settled: it drifts by {drift:.3g} {unit} (at most {allowed:.3g})"
@@ -169,6 +171,17 @@ def refusal_in_contact(sums: TareSums, scatters: Flags6, force: Vector3) -> Refu
     # An infinite or unknown level compares false here and there.
     finite = math.isfinite(level) and math.isfinite(force[2])
     return Refusal.IMPLAUSIBLE if backward or upright or not finite else Refusal.NONE
+
+
+def _standard_errors(freedom: int) -> float:
+    """Return how many estimated standard errors stand for DRIFT_STANDARD_ERRORS known ones.
+
+    freedom: degrees of freedom of the estimate. Quantile of Student's t from that of the normal distribution
+    (Abramowitz & Stegun 26.7.5): a short tare knows its own noise badly, and would refuse what is only noise.
+    """
+    z = DRIFT_STANDARD_ERRORS
+    first, second = (z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96
+    return z + first / freedom + second / freedom**2
 
 
 def _mean_sd(total: float, squares: float, n: int) -> tuple[float, float]:

@@ -153,3 +153,15 @@ def test_a_reading_that_is_no_number_is_refused(value):
     samples[50] = (0.0, 0.0, value, 0.0, 0.0, 0.0)
     with pytest.raises(Refused, match="fz is"):
         tare(samples, *NOISE)
+
+
+@pytest.mark.parametrize(("count", "tares"), [(20, 1000), (30, 1000), (100, 300)])
+def test_white_noise_alone_is_not_taken_for_a_drift(count, tares):
+    """4 sigma on each of six axes are one refusal in 2,600; the noise of a short tare is itself only estimated."""
+    refused = 0
+    for seed in range(tares):
+        try:
+            tare(at_rest(count, noise_n=NOISE[0], noise_nm=NOISE[1], seed=seed), *NOISE)
+        except Refused:
+            refused += 1
+    assert refused <= 3
