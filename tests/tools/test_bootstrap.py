@@ -35,6 +35,7 @@ def test_only_pip_present_installs_from_outside(tmp_path):
     assert not (venv / "bin" / "pip").exists()
 
 
+@pytest.mark.long
 def test_only_venv_present_uses_the_pip_inside(tmp_path):
     python = python_that_refuses(tmp_path, NO_PIP_PACKAGE)
     venv = tmp_path / "env"

@@ -243,6 +243,7 @@ def test_level_sim_has_no_arm_or_base_of_ones_own(push, folder, device):
     assert "cannot be simulated at level sim" in done.err
 
 
+@pytest.mark.long
 def test_opening_a_log_imports_nothing_that_it_names(push, folder):
     (folder / "telltale.py").write_text(
         'import pathlib\npathlib.Path("imported").touch()\nfrom own_devices import Arm\n', encoding="utf-8"
