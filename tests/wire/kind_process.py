@@ -43,7 +43,7 @@ def serve(device: str, kind: str, folder: str) -> None:
     from robot_io.kinds import find_kind
     from robot_io.rig.config import load_rig
     from sim_backend.world.world import World
-    from tools.run.emulators import ExternalEmulator
+    from tools.run.emulated.emulators import ExternalEmulator
 
     loop = EventLoop()
     world = World(load_rig("emulated"), 0, monotonic_ns())

@@ -1,8 +1,8 @@
 """`push emulate ft300|ur10|ridgeback|all`: run the wire emulators for any client, until SIGTERM or Ctrl-C.
 
 A single device is fed by a constant source; `all` runs the three on one simulated world, and reads what a person does
-to the robot by hand as JSON lines on stdin (`tools.run.hands`). Everything listens on loopback only. One line per
-endpoint is printed as soon as it accepts clients.
+to the robot by hand as JSON lines on stdin (`tools.run.emulated.hands`). Everything listens on loopback only.
+One line per endpoint is printed as soon as it accepts clients.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.ur10.standalone import StillArm
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
-from tools.run.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
-from tools.run.hands import Hands
+from tools.run.emulated.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
+from tools.run.emulated.hands import Hands
 from tools.terminal.arguments import SEED, name_or_path, number
 
 ARM_HOST = "127.0.0.10"

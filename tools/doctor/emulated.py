@@ -28,8 +28,8 @@ from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.world.world import World
 from tools.kinds import is_shipped
 from tools.rig import devices_at, kinds_of, with_addresses
-from tools.run.emulators import Emulator, addresses_of, open_emulators
-from tools.run.hands import Hands
+from tools.run.emulated.emulators import Emulator, addresses_of, open_emulators
+from tools.run.emulated.hands import Hands
 
 READY_WITHIN_S = 20.0
 ENDS_WITHIN_S = 2.0
@@ -53,8 +53,8 @@ class EmulatedJob(msgspec.Struct, frozen=True):
 def emulators(rig: RigConfig, kind_folder: str, faults: Sequence[str], hands_fd: int = -1) -> Iterator[RigConfig]:
     """Serve the rig's devices at level emulated; give the rig with their addresses.
 
-    faults: what is wrong with them, in words. hands_fd: the reading end of a pipe for the lines of `tools.run.hands`,
-    which stays the caller's. Raises PushError where they cannot be served.
+    faults: what is wrong with them, in words. hands_fd: the reading end of a pipe for the lines of
+    `tools.run.emulated.hands`, which stays the caller's. Raises PushError where they cannot be served.
     """
     check_faults(rig, faults)
     devices = tuple(devices_at(rig, "emulated"))

@@ -22,7 +22,7 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import rig_from_toml
 from sim_backend.world.world import World
 from tools.log.world_log import ring_listener
-from tools.run.emulators import addresses_of, open_emulators
+from tools.run.emulated.emulators import addresses_of, open_emulators
 from tools.run.jobs import EmulatorJob
 
 PRIORITY = 70

@@ -12,7 +12,7 @@ from robot_io.errors import ConfigError
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.rig.config import load_rig
 from sim_backend.world.world import World
-from tools.run.emulators import addresses_of, open_emulators
+from tools.run.emulated.emulators import addresses_of, open_emulators
 
 
 @pytest.fixture
