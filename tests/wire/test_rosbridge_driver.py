@@ -151,8 +151,13 @@ def test_markers_are_taken_off_the_pose():
         base.drain()
         truth = bridge.report()["pose"]
         assert truth[2] > 0.01
-        pose = gather_until(base, BasePose).value.pose
-        assert (pose.x, pose.y, pose.yaw) == pytest.approx(truth, abs=1e-9)
+
+        def told() -> tuple[float, float, float]:
+            pose = gather_until(base, BasePose).value.pose
+            return (pose.x, pose.y, pose.yaw)
+
+        # A pose that was measured just before the base stood may still be on its way.
+        assert until(lambda: told() == pytest.approx(truth, abs=1e-9))
 
 
 def test_inside_an_event_loop(bridge: Bridge):
