@@ -118,8 +118,8 @@ def play(state: Path, folder: Path, blow: Blow, host: HostWatch) -> Found:
         run.wait_gone(GONE_WITHIN_S)
     assert "Traceback" not in ended.err, ended.err
     assert struck, f"nobody was there to be struck: {ended.err}"
-    # All for a moment, or the launcher before it had started the others: nothing had moved, and it may go on.
-    slept = blow.number == STOP and "launcher" in blow.who
+    # All for a moment, or the launcher before it had started control: nothing had moved, and it may go on.
+    slept = blow.number == STOP and (len(blow.who) > 1 or (blow.name == "launcher" and "control" not in pids))
     assert ended.code or blow.phase == "retreat" or (slept and blow.phase == "opening"), ended.err
     log = _whole_log(folder)
     if ended.code == 0:
