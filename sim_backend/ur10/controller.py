@@ -1,4 +1,4 @@
-"""The emulated controller (CB3): power, safety, program, registers and joints, one 8 ms cycle at a time.
+"""The emulated controller: power, safety, program, registers and joints, one control cycle at a time (8 ms or 2 ms).
 
 It has no sockets. Simplified: power steps take a fixed time; a protective stop pauses the running program and
 unlocking leaves it paused; an emergency stop ends the program and switches the power off.
@@ -10,9 +10,10 @@ import math
 
 from robot_io.clock import NS_PER_MS, NS_PER_S
 from robot_io.messages import Joints
+from sim_backend.ur10.models import UrModel
 from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode
 from sim_backend.ur10.motion import ArmMotion
-from sim_backend.ur10.program import CYCLE_S, OtherProgram, Program, program_of
+from sim_backend.ur10.program import OtherProgram, Program, program_of
 from sim_backend.ur10.registers import Registers, Watchdog
 from sim_backend.world.plant import ArmSource
 
@@ -21,16 +22,15 @@ UNLOCK_AFTER_NS = 5 * NS_PER_S
 START_TIME_S = 1000.0
 """The controller's own clock when the emulator starts."""
 
-Version = tuple[int, int, int, int]
-
 
 class UrController:
     """State of one robot; `cycle` advances it, everything else changes it at once."""
 
-    def __init__(self, source: ArmSource, version: Version, now_ns: int, power_step_s: float = 1.0) -> None:
-        self.version = version
+    def __init__(self, source: ArmSource, model: UrModel, now_ns: int, power_step_s: float = 1.0) -> None:
+        self.model = model
+        self.version = model.version
         self.registers = Registers()
-        self.motion = ArmMotion()
+        self.motion = ArmMotion(model.range_rad)
         self.watchdog: Watchdog | None = None
         self.payload_kg = 0.0
         self.payload_cog_m = (0.0, 0.0, 0.0)
@@ -51,12 +51,12 @@ class UrController:
         self._stopped_ns = 0
         self._waiting: tuple[int, Program] | None = None
         self._power_at: tuple[int, RobotMode] | None = None
-        self.motion.step(source.read_arm(now_ns), CYCLE_S)
+        self.motion.step(source.read_arm(now_ns), model.cycle_s)
 
     @property
     def time_s(self) -> float:
-        """The controller's own clock, s: it advances by exactly 8 ms per cycle."""
-        return START_TIME_S + self.counters["cycles"] * CYCLE_S + self.time_jump_s
+        """The controller's own clock, s: it advances by exactly one cycle time per cycle."""
+        return START_TIME_S + self.counters["cycles"] * self.model.cycle_s + self.time_jump_s
 
     @property
     def reported_q(self) -> Joints:
@@ -81,7 +81,7 @@ class UrController:
         playing = self.runtime_state == RuntimeState.PLAYING
         if playing and self.program is not None and not self.program.step(self, now_ns):
             self.stop_program()
-        self.motion.step(self._source.read_arm(now_ns), CYCLE_S)
+        self.motion.step(self._source.read_arm(now_ns), self.model.cycle_s)
 
     def upload(self, text: str) -> None:
         """Accept a program from a script port; it replaces a running one. Ignored silently when not ready."""

@@ -70,7 +70,7 @@ def _wrench(robot: UrController) -> Values:
 
 
 def _pose(robot: UrController) -> Values:
-    return flange_pose(robot.motion.actual)
+    return flange_pose(robot.motion.actual, robot.model)
 
 
 def _joint_modes(robot: UrController) -> Values:

@@ -78,7 +78,7 @@ def test_newer_cb3_is_accepted() -> None:
 
 
 def test_another_model_is_refused() -> None:
-    with EmulatorProcess(model="UR5") as emulator:
+    with EmulatorProcess(model="ur5") as emulator:
         assert "UR5" in refused(emulator.host, DeviceProtocolError)
 
 
