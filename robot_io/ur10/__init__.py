@@ -1,4 +1,4 @@
-"""The UR10: driver, the process that holds its connection, its readiness checks, and how it is read and held."""
+"""UR arms of both generations: driver, the process that holds the connection, readiness checks, reading and holding."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A plain TCP connection to a UR controller on which every step has a deadline: dashboard lines and RTDE frames.
 
-Sources: RTDE guide (framing, protocol 2), dashboard server manual CB3.
+Sources: RTDE guide (framing, protocol 2), dashboard server manuals CB3 and e-Series.
 """
 
 from __future__ import annotations

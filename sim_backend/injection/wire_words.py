@@ -27,7 +27,7 @@ WIRE_KINDS: dict[str, dict[str, tuple[float, ...]]] = {
         "silent": (), "streaming": (), "latency": (16.0,), "echo": (), "other-device": (), "busy": (), "shared": (),
     },
     "arm": {
-        "silent": (), "dashboard-silent": (), "truncated": (20.0,), "version": (5.11,), "other-model": (),
+        "silent": (), "dashboard-silent": (), "truncated": (20.0,), "version": (10.07,), "other-model": (),
         "safeguard-stop": (), "brakes-on": (), "paused-program": (), "turned": (1.0,), "inputs-taken": (),
     },
     "base": {

@@ -16,7 +16,7 @@ from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.script_server import script_servers
 from sim_backend.ur10.tcp import TcpServer
-from sim_backend.world.plant import ArmSource
+from sim_backend.world.plant import ArmSource, FtSource
 
 REAL_CLOCK = 0.99992
 """What an outside clock makes of a controller's rate."""
@@ -27,7 +27,8 @@ class UrEmulator(UrFaults):
     """An emulated UR arm at `host` (127.x.y.z), serving as soon as its loop runs.
 
     `rate_hz` is the control cycle measured by an outside clock (a real one is never exactly 125 or 500 Hz; None: as
-    one is); `phase` (0..1) shifts its grid; `version` is another PolyScope than the model's. The fault methods are
+    one is); `phase` (0..1) shifts its grid; `version` is another PolyScope than the model's;
+    `wrench` feeds the sensor at the flange, which only an e-Series arm has. The fault methods are
     those of `UrFaults`; `requests` and `counters` record what happened.
     Raises EnvironmentFault when a port is taken, UsageError for an address that is not loopback.
     """
@@ -44,10 +45,11 @@ class UrEmulator(UrFaults):
         version: Version | None = None,
         programs: tuple[str, ...] = ("/programs/other.urp",),
         power_step_s: float = 1.0,
+        wrench: FtSource | None = None,
     ) -> None:
         self.host = host
         self.requests = RequestLog()
-        self.controller = UrController(source, model, monotonic_ns(), power_step_s)
+        self.controller = UrController(source, model, monotonic_ns(), power_step_s, wrench)
         self.controller.version = version or model.version
         self._loop = loop
         self._period_ns = NS_PER_S / (rate_hz or model.rate_hz * REAL_CLOCK)
