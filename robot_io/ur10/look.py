@@ -78,20 +78,26 @@ def receive(host: str) -> list[ArmPacket]:
     """Return the packets of a fifth of a second, in a row. Raises DeviceUnreachable or DeviceProtocolError."""
     with PlainConnection(host, RTDE_PORT, time.monotonic() + LOOK_WITHIN_S) as rtde:
         rate_hz = generation_of(host, begin_rtde(rtde)).rate_hz
-        begin_output(rtde, rate_hz, _OUTPUTS, _TYPES)
+        ask_outputs(rtde, rate_hz, _OUTPUTS, _TYPES)
+        ask_to_send(rtde)
         return [_packet(rtde.where, rtde.read_frame("U")) for _ in range(round(RECEIVE_S * rate_hz))]
 
 
-def begin_output(rtde: PlainConnection, rate_hz: float, names: str, types: str) -> None:
-    """Ask for the values of `names` at a rate, and have them sent. Raises DeviceUnreachable or DeviceProtocolError."""
+def ask_outputs(rtde: PlainConnection, rate_hz: float, names: str, types: str = "") -> str:
+    """Ask for the values of `names` at a rate and return their types. Raises DeviceProtocolError unless `types`."""
     rtde.send(_frame("O", struct.pack(">d", rate_hz) + names.encode()))
     given = rtde.read_frame("O")[1:].decode("ascii", "replace")
-    if given != types:
+    if types and given != types:
         raise DeviceProtocolError(
             f"it gives {given[:120]!r} for the values asked for",
             where=rtde.where,
             do="PolyScope 3.15 (CB3) and 5.4 (e-Series) give them all",
         )
+    return given
+
+
+def ask_to_send(rtde: PlainConnection) -> None:
+    """Have the values sent that were asked for. Raises DeviceUnreachable or DeviceProtocolError."""
     rtde.send(_frame("S", b""))
     if rtde.read_frame("S") != b"\x01":
         raise DeviceProtocolError("it does not start to send", where=rtde.where, do="Restart the controller")
