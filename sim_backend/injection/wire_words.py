@@ -39,7 +39,7 @@ WIRE_KINDS: dict[str, dict[str, tuple[float, ...]]] = {
 """What only the wire has: for each kind its value where none is given; no value where it takes none."""
 
 ON_THE_WIRE: dict[str, tuple[str, ...]] = {
-    "ft": tuple(KINDS["ft"]),
+    "ft": tuple(kind for kind in KINDS["ft"] if kind != "zeroed"),
     "arm": (
         "off", "garbage", "wrong", "moving", "drifting", "protective-stop", "emergency-stop", "powered-off",
         "freedrive", "other-program", "lost",

@@ -20,21 +20,25 @@ class ForceSensor:
     """One sensor, or none. Wrenches are fx, fy, fz (N) and mx, my, mz (N*m)."""
 
     def __init__(self, source: FtSource | None) -> None:
-        self.fitted = source is not None
+        self.source = source
         self.jump: Joints = (0.0,) * 6
         """Added to every reading, for fault injection."""
         self.broken = False
         """Reads NaN, for fault injection."""
-        self._source = source
         self._zero: Joints = (0.0,) * 6
         self._read_ns = -1
         self._reading: Joints = (0.0,) * 6
 
+    @property
+    def fitted(self) -> bool:
+        """Return whether there is a sensor."""
+        return self.source is not None
+
     def raw(self, now_ns: int) -> Joints:
         """Return the reading of the control cycle at `now_ns`, in the flange's axes."""
-        if self._source is not None and now_ns != self._read_ns:
+        if self.source is not None and now_ns != self._read_ns:
             self._read_ns = now_ns
-            self._reading = self._source.read_ft(now_ns)
+            self._reading = self.source.read_ft(now_ns)
         if self.broken:
             return (float("nan"),) * 6
         return _sum(self._reading, self.jump)
