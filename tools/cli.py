@@ -109,12 +109,12 @@ COMMANDS = {
         ("push completion bash", "push completion zsh"),
     ),
     "bench sim": Command(
-        "tools.commands.bench_sim",
+        "tools.bench.sim",
         "measure how much faster than real time level sim is",
         ("push bench sim", "push bench sim --distance-m 2 --json"),
     ),
     "bench physics": Command(
-        "tools.commands.bench_physics",
+        "tools.bench.physics",
         "measure the slider's solvers",
         ("push bench physics", "push bench physics --json"),
     ),

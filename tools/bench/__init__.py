@@ -1,0 +1,1 @@
+"""The commands `push bench ...`: what the program costs on this machine."""
