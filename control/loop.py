@@ -116,7 +116,7 @@ class ControlLoop:
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator, self._paused = Operator.NONE, False
         self._launcher, self._recorder = Silence(), Silence()
-        self._consumed = self._taken = self._last_tick_ns = self._asleep_ns = 0
+        self._consumed = self._taken = self._last_tick_ns = self._asleep_ns = self._woken_ns = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
@@ -201,6 +201,7 @@ class ControlLoop:
     def _on_deadline(self, woken_ns: int) -> None:
         deadline_ns = woken_ns + self._spin_ns
         now_ns = spin_until(deadline_ns, self._clock)
+        self._woken_ns = now_ns
         paced = wake(deadline_ns, self._period_ns, now_ns)
         self._sleep_until(paced.next_deadline_ns)
         self._tick += 1 + paced.skipped
@@ -212,20 +213,21 @@ class ControlLoop:
         try:
             if self._sensor_error is not None:
                 raise self._sensor_error
-            self._one_tick(inp, paced.deadline_ns, now_ns)
+            self._one_tick(inp)
         except Exception as error:  # top level of the loop: whatever failed, the base gets zero and the log records it
             self._give_up(inp, error)
         self.last_ns = now_ns
         self._last_tick_ns = self._clock() - now_ns
         self.timing.note(paced.late_ns, paced.skipped, self._last_tick_ns)
 
-    def _one_tick(self, inp: TickInput, deadline_ns: int, woken_ns: int) -> None:
+    def _one_tick(self, inp: TickInput) -> None:
         after, output = self._fold(self._state, inp)
         folded_ns = self._clock()
         self._base.command(output.command_body, tick=inp.tick, mode=output.mode)
         sent_ns = self._clock()
         self._record(inp, after, output)
-        self.timing.note_stages(deadline_ns, woken_ns, inp.now_ns, folded_ns, sent_ns)
+        deadline_ns = self._woken_ns - inp.host.late_ns
+        self.timing.note_stages(deadline_ns, self._woken_ns, inp.now_ns, folded_ns, sent_ns)
         self.timing.note_record(self._clock() - sent_ns)
         self._state = after
         self.last = (inp, after, output)

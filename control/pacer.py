@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import msgspec
+from collections.abc import Callable
 
-from robot_io.clock import ClockNs
+import msgspec
 
 
 class Wake(msgspec.Struct, frozen=True, gc=False):
@@ -27,7 +27,7 @@ def wake(deadline_ns: int, period_ns: int, now_ns: int) -> Wake:
     return Wake(served_ns, now_ns - served_ns, skipped, served_ns + period_ns)
 
 
-def spin_until(deadline_ns: int, clock: ClockNs) -> int:
+def spin_until(deadline_ns: int, clock: Callable[[], int]) -> int:
     """Wait awake until `deadline_ns` and return the time; at once when it is past."""
     now_ns = clock()
     while now_ns < deadline_ns:
