@@ -20,7 +20,7 @@ from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
 from sim_backend.ridgeback.ros_graph import Message, RosGraph, Topic, message_json
 from sim_backend.ridgeback.ros_types import BadMessage
-from sim_backend.ridgeback.rosapi import RosApi
+from sim_backend.ridgeback.rosapi.services import Answer
 
 UNREGISTER_NS = 10 * NS_PER_S
 """A disconnected client still counts as publisher for this long."""
@@ -103,7 +103,7 @@ class Session:
         self,
         loop: EventLoop,
         graph: RosGraph,
-        rosapi: RosApi | None,
+        call_service: Callable[[str, object, Callable[[Answer], None]], None],
         send: Callable[[str], None],
         counters: Counter[str],
         *,
@@ -112,7 +112,7 @@ class Session:
     ) -> None:
         self._loop = loop
         self._graph = graph
-        self._rosapi = rosapi
+        self._ask_service = call_service
         self._raw_send = send
         self._counters = counters
         self._escape = escape_slashes
@@ -238,15 +238,16 @@ class Session:
         service = _text(request, "service")
         _check_options(request, {"compression": str, "fragment_size": (int, type(None))})
         name, _, old_id = service.partition("#")  # an old notation of the id
-        if self._rosapi is None:
-            ok, values = False, f"Service {self._graph.resolve(name)} does not exist"
-        else:
-            ok, values = self._rosapi.call(name, request.get("args", []))
-        answer = {"op": "service_response", "service": service, "values": values, "result": ok}
         call_id = request.get("id")
-        if call_id is not None or old_id:
-            answer["id"] = old_id if call_id is None else call_id
-        self._send(json.dumps(answer, separators=(",", ":")))
+
+        def on_answer(answer: Answer) -> None:
+            ok, values = answer
+            response = {"op": "service_response", "service": service, "values": values, "result": ok}
+            if call_id is not None or old_id:
+                response["id"] = old_id if call_id is None else call_id
+            self._send(json.dumps(response, separators=(",", ":")))
+
+        self._ask_service(name, request.get("args", []), on_answer)
 
     def _fragment(self, request: Message) -> None:
         number, total, data = request.get("num"), request.get("total"), _text(request, "data")
