@@ -139,3 +139,21 @@ def test_what_belongs_to_the_other_ros_is_not_there(bridge, bridge_2):
         with Client(running) as client:
             answer = client.call(service)
         assert (answer["result"], answer["values"]) == (False, f"Service {service} does not exist")
+
+
+def test_an_action_is_refused_by_ros_2_and_unknown_to_ros_1(bridge, bridge_2):
+    goal = {"op": "send_action_goal", "action": "/dock", "action_type": "nav_msgs/action/Dock", "id": "g1", "args": {}}
+    with Client(bridge_2) as client:
+        client.send(**goal)
+        answer = client.read()
+    assert {key: answer[key] for key in ("op", "action", "id", "result", "status")} == {
+        "op": "action_result",
+        "action": "/dock",
+        "id": "g1",
+        "result": False,
+        "status": 0,
+    }
+    assert "/dock" in answer["values"]
+    with Client(bridge) as client:
+        client.send(**goal)
+        assert client.call("/rosapi/get_time")["op"] == "service_response"  # nothing else has come before it
