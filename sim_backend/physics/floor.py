@@ -16,8 +16,9 @@ import msgspec
 from robot_io.errors import ConfigError
 from sim_backend.physics.floor_patches import FrictionField
 from sim_backend.physics.shapes import Circle, Moment, Point, Shape
-from sim_backend.physics.slider import POINT_SHARE_OF_UNIFORM, Pressure, SliderModel
+from sim_backend.physics.slider import Pressure, SliderModel
 from sim_backend.physics.slider_exact import Grain
+from sim_backend.physics.support import MOST_POINTS, SCALE_OF_UNIFORM, centre_of, support_points
 
 Grip = tuple[float, float, float, float, Grain | None]
 """Current centre of friction x, y (m, BODY), d (m), f_max (N) and grain (BODY)."""
@@ -134,19 +135,18 @@ class _Patches:
 
 
 def _pressure_moment(shape: Shape, pressure: Pressure) -> Moment:
-    """Return the mean of x^2, xy, y^2 of a pressure distribution about the shape's centroid (m^2)."""
-    if pressure == "rim":
-        x, y = shape.centroid_m
-        points = [(px - x, py - y) for px, py in shape.rim_points()]
-        n = len(points)
-        return (
-            sum(p[0] ** 2 for p in points) / n,
-            sum(p[0] * p[1] for p in points) / n,
-            sum(p[1] ** 2 for p in points) / n,
-        )
-    xx, xy, yy = shape.second_moment_m2()
-    scale = 1.0 if pressure == "uniform" else POINT_SHARE_OF_UNIFORM**2
-    return (xx * scale, xy * scale, yy * scale)
+    """Return the mean of x^2, xy, y^2 of a pressure distribution about its centre (m^2)."""
+    if isinstance(pressure, str) and pressure in SCALE_OF_UNIFORM:
+        xx, xy, yy = shape.second_moment_m2()
+        scale = SCALE_OF_UNIFORM[pressure] ** 2
+        return (xx * scale, xy * scale, yy * scale)
+    points = support_points(shape, pressure, MOST_POINTS)
+    x0, y0 = centre_of(points)
+    return (
+        sum(w * (x - x0) ** 2 for x, _, w in points),
+        sum(w * (x - x0) * (y - y0) for x, y, w in points),
+        sum(w * (y - y0) ** 2 for _, y, w in points),
+    )
 
 
 def _room(shape: Shape, cof: Point) -> float:

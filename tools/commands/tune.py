@@ -28,6 +28,7 @@ from sim_backend.physics.gain_limits import (
     offset_per_newton_m,
 )
 from sim_backend.physics.slider import Circle, Pressure, Rectangle
+from sim_backend.physics.support import PressureName
 from tools.rig import resolve_rig
 from tools.study.tune_map import PRESETS
 from tools.terminal.arguments import named_path, number, pair
@@ -37,7 +38,7 @@ from tools.terminal.rig_sliders import rig_sliders, sliders_of
 Choice = TypeVar("Choice", bound=str)
 TUNED = ("force", "force-integral")
 SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
-PRESSURES: tuple[Pressure, ...] = ("uniform", "rim", "point")
+PRESSURES: tuple[PressureName, ...] = ("uniform", "rim", "point", "frame", "corners", "centre")
 MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
 _WORLD_OPTIONS = (
     ("ball-radius-m", (0.001, 0.2), "world.ball_radius_m"),
@@ -67,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--width-m", type=LENGTHS_M, metavar="LOW,HIGH", help="width of a box across the push (default: its length)"
     )
-    parser.add_argument("--pressures", help="any of uniform, rim, point (default: that of [sliders])")
+    parser.add_argument("--pressures", help=f"any of {', '.join(PRESSURES)} (default: that of [sliders])")
     for option, most, key in _WORLD_OPTIONS:
         parser.add_argument(f"--{option}", type=number(*most), metavar="VALUE", help=f"instead of {key} of the rig")
     parser.add_argument(
@@ -99,10 +100,10 @@ def run(args: argparse.Namespace) -> int:
     out = _folder(args.out)
     from tools.study.limit_checks import check_integral_limits, check_limits
 
-    checks = [] if args.no_check else check_limits(sliders, k_f)
+    checks = [] if args.no_check else check_limits(judged, k_f)
     integral = _integral(judged, k_f, k_y) if args.law == "force-integral" else None
     if integral and not args.no_check:
-        checks += check_integral_limits(sliders, k_f, k_y)
+        checks += check_integral_limits(judged, k_f, k_y)
     gains = {f"rig {rig.name}": (rig.control.k_f, rig.control.k_y_rad_per_m), **PRESETS}
     files = _draw(judged, pessimistic, (k_f, k_y), f"{len(sliders)} sliders of {rig.name}", out)
     result: dict[str, Any] = {
@@ -174,7 +175,7 @@ def sliders_assumed(args: argparse.Namespace, rig: RigConfig) -> list[AssumedSli
     sizes = args.size_m or (rig.sliders.shortest_m, rig.sliders.longest_m)
     shapes = _choices(args.shapes, SHAPES, "--shapes") if args.shapes is not None else list(SHAPES)
     if args.pressures is not None:
-        pressures = _choices(args.pressures, PRESSURES, "--pressures")
+        pressures: list[Pressure] = list(_choices(args.pressures, PRESSURES, "--pressures"))
     else:
         pressures = [rig.sliders.pressure]
     if all(given is None for given in (args.shapes, args.size_m, args.width_m, args.pressures)):
