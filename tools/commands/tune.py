@@ -41,12 +41,12 @@ SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
 PRESSURES: tuple[PressureName, ...] = ("uniform", "rim", "point", "frame", "corners", "centre")
 MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
 _WORLD_OPTIONS = (
-    ("ball-radius-m", (0.001, 0.2), "world.ball_radius_m"),
-    ("push-height-m", (0, 2), "world.floor.push_height_m"),
-    ("floor-friction", (0.001, 2), "world.slider.floor_friction"),
-    ("anisotropy", (0.5, 2), "world.floor.along_over_across"),
+    ("ball-radius-m", "M", (0.001, 0.2), "world.ball_radius_m"),
+    ("push-height-m", "M", (0, 2), "world.floor.push_height_m"),
+    ("floor-friction", "MU", (0.001, 2), "world.slider.floor_friction"),
+    ("anisotropy", "RATIO", (0.5, 2), "world.floor.along_over_across"),
 )
-"""Name, range and key of the rig's values that have an option of their own."""
+"""Name, metavar, range and key of the rig's values that have an option of their own."""
 SHARE = 0.5
 """The recommended k_y is this share of its limit: twice the gain is still stable."""
 LENGTHS_M = pair(0.01, 10, "LOW,HIGH", rising=True)
@@ -69,8 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--width-m", type=LENGTHS_M, metavar="LOW,HIGH", help="width of a box across the push (default: its length)"
     )
     parser.add_argument("--pressures", help=f"any of {', '.join(PRESSURES)} (default: that of [sliders])")
-    for option, most, key in _WORLD_OPTIONS:
-        parser.add_argument(f"--{option}", type=number(*most), metavar="VALUE", help=f"instead of {key} of the rig")
+    for option, metavar, most, key in _WORLD_OPTIONS:
+        parser.add_argument(f"--{option}", type=number(*most), metavar=metavar, help=f"instead of {key} of the rig")
     parser.add_argument(
         "--slide-force-N", type=number(0.1, 300), default=15.0, metavar="N", help="force that keeps a slider moving"
     )
@@ -166,7 +166,7 @@ def _integral(bodies: Sequence[PushedBody], k_f: float, k_y: float) -> dict[str,
 
 def rig_of(args: argparse.Namespace) -> RigConfig:
     """Return the rig with the options that stand for values of it. Raises ConfigError and UsageError of the rig."""
-    given = [(key, getattr(args, option.replace("-", "_"))) for option, _, key in _WORLD_OPTIONS]
+    given = [(key, getattr(args, option.replace("-", "_"))) for option, _, _, key in _WORLD_OPTIONS]
     return resolve_rig(args.rig, [*args.overrides, *(f"{key}={value}" for key, value in given if value is not None)])
 
 
