@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable, Sequence
+from typing import Literal
 
 import msgspec
 
 from robot_io.errors import ConfigError
+from sim_backend.physics.contact import PushedSlider
 from sim_backend.physics.floor import Floor, FloorEffects
 from sim_backend.physics.gain_limits import PushedBody
 from sim_backend.physics.slider import Circle, Pressure, Rectangle, SliderModel, pressure_distance_m
 
+Turning = Literal["ellipsoid", "along-push", "coulomb"]
 SAMPLES = 5
 """Number of sizes taken from a range, including its ends."""
 
@@ -33,7 +36,13 @@ class AssumedSlider(msgspec.Struct, frozen=True):
         shift, grain = self.effects.shift_m, self.effects.along_over_across
         return PushedBody(is_round, rho, d, self.ball_radius_m, shift, grain)
 
-    def on(self, turning: str) -> AssumedSlider:
+    def pushed(self, turning: Turning, contact_friction: float) -> PushedSlider:
+        """Return it at the origin, heading along x, to be pushed on such a floor. Raises ConfigError if it tips over."""
+        model = SliderModel(self.outline, 1.0, pressure_distance_m(self.outline, self.pressure), contact_friction)
+        floor = Floor(model, self.pressure, self.on(turning).effects)
+        return PushedSlider(model, (0.0, 0.0, 0.0), self.ball_radius_m, floor=floor)
+
+    def on(self, turning: Turning) -> AssumedSlider:
         """Return the same slider judged by another resistance to turning, which is one of `[world.floor] turning`."""
         effects = msgspec.structs.replace(self.effects, turning=turning)
         return msgspec.structs.replace(self, effects=effects)

@@ -100,10 +100,10 @@ def run(args: argparse.Namespace) -> int:
     out = _folder(args.out)
     from tools.study.limit_checks import check_integral_limits, check_limits
 
-    checks = [] if args.no_check else check_limits(judged, k_f)
+    checks = [] if args.no_check else check_limits(sliders, k_f)
     integral = _integral(judged, k_f, k_y) if args.law == "force-integral" else None
     if integral and not args.no_check:
-        checks += check_integral_limits(judged, k_f, k_y)
+        checks += check_integral_limits(sliders, k_f, k_y)
     gains = {f"rig {rig.name}": (rig.control.k_f, rig.control.k_y_rad_per_m), **PRESETS}
     files = _draw(judged, pessimistic, (k_f, k_y), f"{len(sliders)} sliders of {rig.name}", out)
     result: dict[str, Any] = {

@@ -39,9 +39,8 @@ def sliders_of(
 
 
 def _effects(rig: RigConfig) -> FloorEffects:
-    floor = rig.world.floor
     return FloorEffects(
-        shift_m=rig.world.slider.floor_friction * floor.push_height_m,
+        shift_m=rig.world.slider.floor_friction * rig.push_height_m,
         turning="along-push",
-        along_over_across=floor.along_over_across,
+        along_over_across=rig.world.floor.along_over_across,
     )

@@ -1,8 +1,8 @@
 """The limits of gains against a push on support points with Coulomb friction, linearised by differences of one step.
 
 Nothing of the simulation is used: each point's friction is its load along its own velocity, the pressure leans as a
-stiff body's does, and the ball sticks to the face or slides along it without friction. What leaning takes from d^2 (the
-square of the shift) the closed form leaves out: its limits are a little low.
+stiff body's does, and the ball sticks to the face or slides along it without friction. Leaning takes the square of
+the shift from d^2.
 """
 
 from __future__ import annotations
@@ -113,7 +113,6 @@ def test_the_linearised_push_begins_to_weave_where_the_closed_form_says(pressure
         found = limit_of(lambda k_y, s=sticks: Push(POINTS[pressure], K_F, k_y, sticks=s).growth() > 1.0, 0.1, 2.0)
         assert found == pytest.approx(expected, rel=0.005)
         assert form(box(LEANING[pressure]), K_F) == pytest.approx(expected, rel=0.001)
-        assert 0.96 * expected < form(box(LEANING[pressure] + SHIFT**2), K_F) < expected, "on the safe side"
 
 
 @pytest.mark.parametrize(("pressure", "expected"), [("corners", 1.290), ("frame", 1.989), ("even", 4.333)])
@@ -122,6 +121,5 @@ def test_the_force_angle_runs_away_where_the_closed_form_says(pressure, expected
     found = limit_of(lambda k_f: Push(POINTS[pressure], k_f, 1e-3, sticks=True).growth() > 1.0, 0.5, 8.0)
     assert found == pytest.approx(expected, rel=0.005)
     assert fast_loop_k_f([box(LEANING[pressure])]) == pytest.approx(expected, rel=0.001)
-    assert 0.84 * expected < fast_loop_k_f([box(LEANING[pressure] + SHIFT**2)]) < expected, "on the safe side"
     if pressure == "corners":
         assert fast_loop_k_f([box(2 * RHO**2)]) == pytest.approx(0.6125)
