@@ -37,7 +37,7 @@ class AssumedSlider(msgspec.Struct, frozen=True):
         return PushedBody(is_round, rho, d, self.ball_radius_m, shift, grain)
 
     def pushed(self, turning: Turning, contact_friction: float) -> PushedSlider:
-        """Return it at the origin, heading along x, to be pushed on such a floor. Raises ConfigError if it tips over."""
+        """Return it at the origin, heading along x, on such a floor. Raises ConfigError if it tips over."""
         model = SliderModel(self.outline, 1.0, pressure_distance_m(self.outline, self.pressure), contact_friction)
         floor = Floor(model, self.pressure, self.on(turning).effects)
         return PushedSlider(model, (0.0, 0.0, 0.0), self.ball_radius_m, floor=floor)

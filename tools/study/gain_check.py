@@ -1,8 +1,8 @@
 """Verify the limits of `sim_backend.physics.gain_limits` by simulation: where a small oscillation begins to grow.
 
-The push is simulated by the world's own model (`contact.PushedSlider` with its floor: Coulomb friction at support points
-for a slider that is given, else the body's d), the law uses the force of the previous step, and a search finds the gain
-at which the growth rate of a small oscillation is zero.
+The push is simulated by the world's own model (`contact.PushedSlider` with its floor: Coulomb friction at support
+points for a slider that is given, else the body's d), the law uses the force of the previous step, and a search finds
+the gain at which the growth rate of a small oscillation is zero.
 """
 
 from __future__ import annotations

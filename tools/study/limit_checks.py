@@ -18,7 +18,7 @@ from tools.study.gain_check import simulated_integral_limit, simulated_limit
 
 
 def check_limits(sliders: Sequence[AssumedSlider], k_f: float) -> list[dict[str, Any]]:
-    """Simulate the limiting slider of each formula on its support points; return both limits, and how far they differ."""
+    """Simulate the limiting slider of each formula on its support points; return both limits and their difference."""
     by_body = [(slider.body(), slider) for slider in sliders]
     formulas: dict[str, Callable[[PushedBody, float], float]] = {
         "sticking": sticking_limit,
