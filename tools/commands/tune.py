@@ -30,7 +30,7 @@ from sim_backend.physics.gain_limits import (
 from sim_backend.physics.slider import Circle, Pressure, Rectangle
 from sim_backend.physics.support import PressureName
 from tools.rig import resolve_rig
-from tools.study.tune_map import PRESETS
+from tools.sweep.tune_map import PRESETS
 from tools.terminal.arguments import named_path, number, pair
 from tools.terminal.rig_arguments import add_rig
 from tools.terminal.rig_sliders import rig_sliders, sliders_of
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
         )
     k_y = _rounded_down(SHARE * highest)
     out = _folder(args.out)
-    from tools.study.limit_checks import check_integral_limits, check_limits
+    from tools.sweep.limit_checks import check_integral_limits, check_limits
 
     checks = [] if args.no_check else check_limits(sliders, k_f)
     integral = _integral(judged, k_f, k_y) if args.law == "force-integral" else None
@@ -236,8 +236,8 @@ def _draw(
     what: str,
     out: Path,
 ) -> list[str]:
-    from tools.study.figures import save
-    from tools.study.tune_map import draw
+    from tools.sweep.figures import save
+    from tools.sweep.tune_map import draw
 
     curves = []
     for some in (judged, pessimistic):
