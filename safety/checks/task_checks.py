@@ -14,7 +14,7 @@ REST_TIMEOUT_NS = 5_000_000_000
 AT_REST_PHASES = (Phase.REST, Phase.CHECK, Phase.LOST_HOLD)
 BACKWARD_TICKS = 20
 SIDEWAYS_M = 0.3
-"""As much as a lost contact has by default; pushes that the law saves need about half of it (docs/laws.md)."""
+"""As much as a lost contact has by default; pushes that the law saves need less than half of it (docs/laws.md)."""
 RESIDUAL_N = 5.0
 """The smallest meaningful force according to the sensor's product sheet."""
 

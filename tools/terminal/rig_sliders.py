@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robot_io.rig.config import RigConfig
-from sim_backend.physics.assumed_sliders import AssumedSlider, assumed_sliders, samples
+from sim_backend.physics.assumed_sliders import AssumedSlider, Turning, assumed_sliders, samples
 from sim_backend.physics.floor import FloorEffects
 from sim_backend.physics.slider import Circle, Pressure, Rectangle
 from sim_backend.world.scene import slider_model
@@ -24,7 +24,7 @@ def rig_sliders(rig: RigConfig) -> list[AssumedSlider]:
         world = rig.world
         shape = slider_model(world.slider).shape
         assert isinstance(shape, Circle | Rectangle)
-        turning = "ellipsoid" if world.floor.turning == "ellipsoid" else "along-push"
+        turning: Turning = "ellipsoid" if world.floor.turning == "ellipsoid" else "along-push"
         simulated = AssumedSlider(shape, world.slider.pressure, _effects(rig), world.ball_radius_m).on(turning)
         simulated.body()
         sliders.append(simulated)
