@@ -40,7 +40,8 @@ def test_one_slider_gives_its_own_limit(tmp_path, capsys):
         capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "circle", "--size-m", "0.5,0.5",
         "--pressures", "rim", "--turning", "along-push", "--floor-friction", "0.3", "--anisotropy", "1.05",
     )  # fmt: skip
-    body = PushedBody(True, 0.25, 0.25 / 2**0.5, 0.05, 0.045, 1.05)
+    # a ring's mean square along the push, about the pressure's centre, which has run 0.045 m ahead
+    body = PushedBody(True, 0.25, (0.25**2 / 2 - 0.045**2) ** 0.5, 0.05, 0.045, 1.05)
     assert result["assumed"] == 1
     assert result["limit_k_y_rad_per_m"] == pytest.approx(limit([body], 0.3))
     at = {entry["k_f"]: entry["k_y_rad_per_m"] for entry in result["limits"]}
@@ -139,8 +140,9 @@ def test_run_warns_of_gains_with_little_margin_only():
 
 
 def test_run_warns_for_the_whole_range_of_sliders_that_the_rig_assumes():
-    """Sticking box of length L, ball R, uniform: k_y < k_f (L/2 - R) / (d^2 + L^2/4), d = 0.3826 L."""
-    limit_1m = 0.3 * (0.5 - 0.05) / (0.382598**2 + 0.25)
+    """Sticking box of length 1 m, ball R, uniform, pushed 0.15 m above a floor of friction 0.3, which is 0.045 m ahead:
+    k_y < k_f (0.5 - R) / (d^2 + 0.5 (0.5 + 0.045)), d^2 = 1/12 - 0.045^2."""
+    limit_1m = 0.3 * (0.5 - 0.05) / (1 / 12 - 0.045**2 + 0.5 * 0.545)
     for share, warned in ((0.68, False), (0.72, True)):
         settings = [f"control.k_y_rad_per_m={share * limit_1m}", "sliders.longest_m=1.0"]
         for rig in ("sim", "thing"):
