@@ -2,6 +2,7 @@
 
     theta_p = (k_f + 1) theta_f + k_y y_c
 
+The second term is bounded (`MOST_OFFSET_RAD`): far beside the path the object is to come back, not to be turned away.
 All angles are in the PATH frame. The sign of the k_y term looks wrong but is correct: left of the path
 (y_c > 0) the pusher goes further left, which turns the object until its contact force points back to the path.
 """
@@ -9,6 +10,9 @@ All angles are in the PATH frame. The sign of the k_y term looks wrong but is co
 from __future__ import annotations
 
 import math
+
+MOST_OFFSET_RAD = 0.25
+"""Bound of k_y y_c, rad: more only turns an object away that is far beside the path (docs/laws.md)."""
 
 
 def force_angle(fx_path: float, fy_path: float) -> float:
@@ -21,8 +25,9 @@ def force_angle(fx_path: float, fy_path: float) -> float:
 
 
 def push_angle(theta_f: float, lateral_m: float, k_f: float, k_y_rad_per_m: float) -> float:
-    """Return theta_p in rad, not wrapped and not clipped: safety judges angles beyond +-90 degrees."""
-    return (k_f + 1.0) * theta_f + k_y_rad_per_m * lateral_m
+    """Return theta_p in rad, not wrapped and not clipped: `steering` judges angles beyond +-90 degrees."""
+    turned = k_y_rad_per_m * lateral_m
+    return (k_f + 1.0) * theta_f + min(max(turned, -MOST_OFFSET_RAD), MOST_OFFSET_RAD)
 
 
 def return_angle(theta_p: float, lateral_m: float, k_y_rad_per_m: float, turn_rad: float) -> float:

@@ -213,6 +213,7 @@ def _without_force(
             anchor_x=contact[0],
             anchor_y=contact[1],
             backward_ticks=0,
+            sideways_m=0.0,
             lost_count=state.lost_count + 1,
         )
     gone_s = (inp.now_ns - state.phase_since_ns) * S

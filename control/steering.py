@@ -11,7 +11,10 @@ from control.laws.law import Seen
 from control.settings import Settings
 from robot_io.tick import ControlState, TickInput
 
-BACKWARD_RAD = math.pi / 2
+SIDEWAYS_RAD = math.pi / 2
+"""A law that asks for more is followed as far as this: sideways, never backward (docs/laws.md)."""
+BACKWARD_RAD = math.radians(135.0)
+"""... and not at all beyond this, where it is the force that points backward."""
 
 
 def steer(
@@ -39,9 +42,19 @@ def steer(
     if said.error:
         return replace(state, theta_f=theta_f, law_error=said.error, speed=0.0)
     theta_p = said.theta_p_rad if math.isfinite(said.theta_p_rad) else math.nan
-    if abs(theta_p) > BACKWARD_RAD:
-        # Beyond 90 degrees the law would pull: the direction is kept and safety counts the ticks (F56).
-        backward = state.backward_ticks + 1
-        return replace(state, theta_f=theta_f, law_state=said.state, speed=speed, backward_ticks=backward)
+    way_m, backward = 0.0, 0
+    if abs(theta_p) > SIDEWAYS_RAD:  # safety bounds the way (F56-way)
+        way_m = state.sideways_m + speed * seen.dt_s
+    if abs(theta_p) > BACKWARD_RAD:  # the direction is kept, and safety counts the ticks (F56)
+        backward, theta_p = state.backward_ticks + 1, state.theta_p
+    theta_p = math.copysign(min(abs(theta_p), SIDEWAYS_RAD), theta_p)
     # Not a number: F58 at once.
-    return replace(state, theta_f=theta_f, law_state=said.state, theta_p=theta_p, speed=speed, backward_ticks=0)
+    return replace(
+        state,
+        theta_f=theta_f,
+        law_state=said.state,
+        theta_p=theta_p,
+        speed=speed,
+        backward_ticks=backward,
+        sideways_m=way_m,
+    )

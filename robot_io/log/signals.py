@@ -37,6 +37,7 @@ FAULT_IDS: tuple[str, ...] = (
         "F55-slow",
         "F55-stop",
         "F56",
+        "F56-way",
         "F57",
         "F57-slow",
         "F58",

@@ -26,7 +26,7 @@ class SlidersConfig(Table, frozen=True):
     """Length along the push, or diameter, of the smallest ..."""
     longest_m: Positive = 0.5
     """... and of the largest."""
-    pressure: Literal["uniform", "rim", "point"] = "uniform"
+    pressure: Literal["uniform", "rim", "point", "frame", "corners", "centre"] = "uniform"
 
 
 class WorkspaceConfig(Table, frozen=True):

@@ -127,6 +127,7 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     """Contact point in the WORLD frame where LOST or RETREAT began, m."""
     rest_since_ns: int = 0
     backward_ticks: int = 0
+    """Ticks in a row in which the law asked for more than 135 degrees."""
     end_progress_m: float = 0.0
     end_lateral_m: float = 0.0
     residual_N: float = float("nan")
@@ -152,3 +153,5 @@ class ControlState(msgspec.Struct, frozen=True, gc=False):
     """What the law remembers, as numbers; their names are in the log's metadata. Empty before its first step."""
     law_error: str = ""
     """What the law did wrong; "" while it has not."""
+    sideways_m: float = 0.0
+    """Way in one piece on which the law asked for more than 90 degrees, and was followed as far as 90."""

@@ -13,6 +13,8 @@ REST_TIMEOUT_NS = 5_000_000_000
 """A stopped base comes to rest within 1 s; motion still measured after this is false or not caused by us."""
 AT_REST_PHASES = (Phase.REST, Phase.CHECK, Phase.LOST_HOLD)
 BACKWARD_TICKS = 20
+SIDEWAYS_M = 0.3
+"""As much as a lost contact has by default; pushes that the law saves need less than half of it (docs/laws.md)."""
 RESIDUAL_N = 5.0
 """The smallest meaningful force according to the sensor's product sheet."""
 
@@ -42,6 +44,8 @@ def check(inp: TickInput, control: ControlState, wanted: BodyTwist, first_ns: in
         faults.append("F57")
     if control.backward_ticks >= BACKWARD_TICKS:
         faults.append(Finding("F56", control.backward_ticks))
+    if control.sideways_m >= SIDEWAYS_M:
+        faults.append(Finding("F56-way", control.sideways_m))
     if not (math.isfinite(wanted.vx) and math.isfinite(wanted.vy) and math.isfinite(wanted.omega)):
         faults.append("F58")
     if control.residual_N > RESIDUAL_N:

@@ -41,6 +41,11 @@ TASK_ADVICE: dict[str, Advice] = {
         "The force points the wrong way: wrong frames or signs, or gains that are too high for this object.",
         "Check the signs (docs/frames-and-signs.md), and the gains with `push tune`.",
     ),
+    "F56-way": Advice(
+        "The object has turned too far aside to be saved: a start too far off its middle or its path, or gains that "
+        "are too high for it; or the force seems to point aside, by a tare or frames that are wrong.",
+        "Put the ball nearer to the object's middle and aim along the path; find gains with `push tune`.",
+    ),
     "F57": Advice(
         "A defect in a law of your own; the run's notes have its words.",
         "Replay the log with the law: it shows the tick at which it happened; mend the law.",

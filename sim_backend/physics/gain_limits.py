@@ -1,15 +1,17 @@
 """The largest k_y at which a straight push does not start to weave: linear stability of the law, in closed form.
 
 Linearised about the straight push, with rho from contact to centre of mass along the push, d the length that resists
-turning (mean square distance of the pressure along the push, or tau_max/f_max), R the ball's radius, L the pressure's
-shift (floor friction times push height) and a the floor's friction along over across the path; kappa = k_f + 1 - a^2:
+turning (d^2 the mean square distance of the pressure along the push; tau_max/f_max is pessimistic), R the ball's
+radius, L the pressure's shift (floor friction times push height) and a the floor's friction along over across the path;
+kappa = k_f + 1 - a^2:
 
     box, sticking        k_y < kappa (rho - R) / (a^2 d^2 + rho (rho + L))
     box, frictionless    (H/d^2 - k_y)(kappa - H k_y) > a^2 k_y,   H = rho + L + R
     circle, sticking     k_y < kappa rho^2/(rho + R) / (a^2 d^2 + rho (rho + L))
     circle, frictionless k_y < kappa / (rho + R)
 
-The law's y_c is that of the ball's centre. Derived here; R = L = 0, a = 1 is the paper's point pusher on an even floor.
+The law's y_c is that of the ball's centre. Derived in docs/laws.md; R = L = 0, a = 1 is the paper's point pusher on an
+even floor.
 """
 
 from __future__ import annotations

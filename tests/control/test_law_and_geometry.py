@@ -28,9 +28,12 @@ def numbers(twist: BodyTwist):
         (-0.1, 0.0, 0.3, 0.2, -0.13),
         (0.0, 0.5, 0.3, 0.2, 0.1),  # left of the path: further left, the sign that looks wrong and is right
         (0.0, -0.5, 0.3, 0.2, -0.1),
-        (0.2, -1.0, 0.1, 0.3, -0.08),
+        (0.2, -0.5, 0.1, 0.3, 0.07),
+        (0.0, 1.25, 0.3, 0.2, 0.25),
+        (0.0, 3.0, 0.3, 0.2, 0.25),  # further beside the path the offset says no more
+        (0.0, -3.0, 0.3, 0.2, -0.25),
         (0.25, 4.0, 0.0, 0.0, 0.25),  # without gains the pusher follows the force
-        (3.0, 1.0, 1.0, 0.5, 6.5),  # neither wrapped nor clipped
+        (3.0, 0.5, 1.0, 0.5, 6.25),  # neither wrapped nor clipped
     ],
 )
 def test_the_law(theta_f, lateral, k_f, k_y, theta_p):

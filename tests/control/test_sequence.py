@@ -235,20 +235,41 @@ def test_the_open_loop_baseline_goes_straight_whatever_it_feels():
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_push_angle_beyond_90_degrees_is_a_fault_and_never_clipped(side):
-    """Force at 75 degrees, k_f 0.3: 97.5 degrees wanted. The direction stays as it was until the fault stops it."""
-    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+def test_a_push_angle_beyond_90_degrees_pushes_sideways_and_after_0_3_m_it_is_a_fault(side):
+    """Force at 75 degrees, k_f 0.3: 97.5 degrees wanted. The ball goes sideways, never backward, for 3 s at 0.1 m/s."""
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0", "control.distance_m=3"))
     angle = side * math.radians(75.0)
     bench.force_path = (15.0 * math.cos(angle), 15.0 * math.sin(angle))
     bench.fold()
-    assert bench.state.control.backward_ticks == 0, "the median of three has it with the second packet"
+    assert bench.state.control.sideways_m == 0.0, "the median of three has it with the second packet"
+    for n in range(1, 300):
+        bench.fold()
+        assert bench.output.faults == (), n
+        assert bench.state.control.theta_p == pytest.approx(side * math.pi / 2)
+        assert bench.state.control.theta_f == pytest.approx(angle, abs=0.01)
+        assert bench.state.control.sideways_m == pytest.approx(0.001 * n)
+    bench.fold()
+    bench.fold()
+    assert bench.output.faults == ("F56-way",)
+    assert bench.output.mode == Mode.STOP
+    assert bench.output.command_body == BodyTwist()
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_force_that_points_backward_is_a_fault_and_not_followed(side):
+    """Force at 110 degrees: 143 wanted. The direction stays as it was until the fault stops it after 20 ticks."""
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+    for _ in range(100):  # beyond where F11 compares force and motion
+        bench.fold()
+    angle = side * math.radians(110.0)
+    bench.force_path = (15.0 * math.cos(angle), 15.0 * math.sin(angle))
+    bench.fold()
     before = bench.state.control.theta_p
     for n in range(19):
         bench.fold()
         assert bench.state.control.backward_ticks == n + 1
         assert bench.output.faults == ()
         assert bench.state.control.theta_p == before
-        assert bench.state.control.theta_f == pytest.approx(angle, abs=0.01)
     bench.fold()
     assert bench.output.faults == ("F56",)
     assert bench.output.mode == Mode.STOP
@@ -256,26 +277,26 @@ def test_a_push_angle_beyond_90_degrees_is_a_fault_and_never_clipped(side):
 
 
 def test_a_moment_beyond_90_degrees_is_forgiven():
-    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0", "control.distance_m=3"))
     for _ in range(3):
         bench.force_path = (15.0 * math.cos(1.4), 15.0 * math.sin(1.4))
-        for _ in range(19):
+        for _ in range(290):
             bench.fold()
         bench.force_path = (15.0, 0.0)
         felt(bench)
-        assert bench.state.control.backward_ticks == 0
+        assert bench.state.control.sideways_m == 0.0
     assert bench.output.faults == ()
 
 
-def test_a_lost_force_begins_the_count_of_backward_ticks_anew():
-    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0"))
+def test_a_lost_force_begins_the_way_sideways_anew():
+    bench = pushing(("control.force_filter_tau_s=0", "control.k_y_rad_per_m=0", "control.distance_m=3"))
     for _ in range(2):
         bench.force_path = (15.0 * math.cos(1.4), 15.0 * math.sin(1.4))
-        for _ in range(19):
+        for _ in range(290):
             bench.fold()
         felt(bench, no_force)
         assert bench.state.control.phase == Phase.LOST
-        assert bench.state.control.backward_ticks == 0
+        assert bench.state.control.sideways_m == 0.0
     assert bench.output.faults == ("F52",)
 
 

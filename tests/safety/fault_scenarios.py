@@ -253,9 +253,9 @@ def touching_backward() -> FoldBench:
     return bench.run_to(Phase.PUSH)
 
 
-def pushing_for_a_while() -> FoldBench:
+def pushing_for_a_while(overrides: tuple[str, ...] = ()) -> FoldBench:
     """Return a bench that has pushed with 15 N for 4 s."""
-    bench = pushing()
+    bench = pushing(overrides)
     for _ in range(300):
         bench.fold()
     return bench
@@ -312,8 +312,15 @@ def lost_for_good() -> FoldBench:
 
 def pushing_sideways() -> FoldBench:
     """Return a bench whose force points 75 degrees off from the next tick on: 97.5 degrees wanted."""
-    bench = pushing(UNFILTERED)
+    bench = pushing((*UNFILTERED, "control.distance_m=3.0"))
     bench.force_path = (15.0 * math.cos(math.radians(75)), 15.0 * math.sin(math.radians(75)))
+    return bench
+
+
+def pushing_backward() -> FoldBench:
+    """Return a bench whose force points 110 degrees off from the next tick on: 143 degrees wanted."""
+    bench = pushing_for_a_while(UNFILTERED)
+    bench.force_path = (15.0 * math.cos(math.radians(110)), 15.0 * math.sin(math.radians(110)))
     return bench
 
 
@@ -515,7 +522,8 @@ SCENARIOS = [
     Scenario("F54-stop", "against a wall", stuck(60.0)),
     Scenario("F54-hold", "110 N", pressed(110.0), warm=1002, also=frozenset({"F50-slow"})),
     Scenario("F54-hold", "four times the usual", pressed(62.0), pushing_for_a_while, warm=1006),
-    Scenario("F56", "backward", lambda inp, _: inp, pushing_sideways),
+    Scenario("F56", "backward", lambda inp, _: inp, pushing_backward),
+    Scenario("F56-way", "sideways", lambda inp, _: inp, pushing_sideways, warm=300),
     Scenario("F57", "it raises", lambda inp, _: inp, pushing_by(Raising())),
     Scenario("F57", "another state", lambda inp, _: inp, pushing_by(Forgetful())),
     Scenario("F57-slow", "1 ms and a bit", host(law_ns=1_000_001)),

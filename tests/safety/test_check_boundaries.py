@@ -325,6 +325,8 @@ def test_thresholds_of_the_task():
     assert task_checks.check(GOOD, settling, BodyTwist(), NOW - 5_000_000_001) == ["R01"]
     assert task_checks.check(GOOD, replace(TARED, backward_ticks=19), BodyTwist(), NOW) == []
     assert task_checks.check(GOOD, replace(TARED, backward_ticks=20), BodyTwist(), NOW) == ["F56"]
+    assert task_checks.check(GOOD, replace(TARED, sideways_m=0.299), BodyTwist(), NOW) == []
+    assert task_checks.check(GOOD, replace(TARED, sideways_m=0.3), BodyTwist(), NOW) == ["F56-way"]
     assert task_checks.check(GOOD, replace(TARED, residual_N=5.0), BodyTwist(), NOW) == []
     assert task_checks.check(GOOD, replace(TARED, residual_N=beyond(5.0)), BodyTwist(), NOW) == ["F09"]
 

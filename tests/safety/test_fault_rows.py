@@ -77,7 +77,7 @@ WITHOUT_EVIDENCE = ("F09", "F09-before", "F36", "F53-early")
 """Rows whose scenario begins before there can be anything to see."""
 
 
-BY_WAY = ("F33-way", "F37", "F43", "F59")
+BY_WAY = ("F33-way", "F37", "F43", "F56-way", "F59")
 """Rows that go by the way, not by the time: see the tests of these checks."""
 
 

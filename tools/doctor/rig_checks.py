@@ -13,7 +13,7 @@ from safety.workspace import SPARE_AHEAD_M, SPARE_AROUND_M, WorkspaceSettings
 from tools.doctor.check import Check, Rows
 from tools.rig import devices_at
 from tools.run.facts.bounds import check_room, stopping_line, workspace_line
-from tools.terminal.gain_warning import gain_warning
+from tools.terminal.gain_warning import gain_margin, gain_warning
 from tools.verdict.calibration_age import calibration_age
 
 
@@ -78,7 +78,7 @@ def _stopping(rows: Rows, rig: RigConfig) -> None:
 
 def _gains(rows: Rows, rig: RigConfig) -> None:
     try:
-        warning = gain_warning(rig)
+        warning, margin = gain_warning(rig), gain_margin(rig)
     except PushError as error:
         rows.error("gains", error)
         return
@@ -86,7 +86,10 @@ def _gains(rows: Rows, rig: RigConfig) -> None:
     if warning:
         rows.bad("gains", "warning", warning, "`push tune` finds better ones", rig.control.k_y_rad_per_m, None, "rad/m")
     else:
-        rows.ok("gains", f"{gains} with margin for the sliders of this rig", rig.control.k_y_rad_per_m, None, "rad/m")
+        judged = f": k_y is {margin.words}" if margin else ""
+        told = f"{gains} with margin for the sliders of this rig{judged}"
+        limit = margin.limit_rad_per_m if margin else None
+        rows.ok("gains", told, rig.control.k_y_rad_per_m, limit, "rad/m")
 
 
 def _calibration(rows: Rows, rig: RigConfig) -> None:

@@ -37,8 +37,13 @@ def far_beyond(inp: TickInput, state: TickState) -> bool:
 
 
 def backward(_inp: TickInput, state: TickState) -> bool:
-    """Return whether the law pushes backward (F56)."""
+    """Return whether the law asks for more than 135 degrees (F56)."""
     return state.control.backward_ticks > 0
+
+
+def sideways(_inp: TickInput, state: TickState) -> bool:
+    """Return whether the law asks for more than 90 degrees (F56-way)."""
+    return state.control.sideways_m > 0
 
 
 def off_by_half(inp: TickInput, _state: TickState) -> bool:
@@ -192,7 +197,8 @@ SCENARIOS: tuple[Scenario, ...] = (
     ),
     Scenario("F55-slow", "drifts aside", ("base.odometry.wrong=0,0.04",), edge_beside_m=0.018, settings=CALM),
     Scenario("F55-stop", "drifts aside", ("base.odometry.wrong=0,0.08",), edge_beside_m=0.018, settings=CALM),
-    Scenario("F56", "it pushes from the side", alter=do.pushed_aside(75.0, 15.0), begins=backward),
+    Scenario("F56", "it pulls", alter=do.pushed_aside(110.0, 15.0), begins=backward),
+    Scenario("F56-way", "it pushes from the side", alter=do.pushed_aside(75.0, 15.0), begins=sideways),
     Scenario("F57", "the law raises an exception", core=steered_by(Raising())),
     Scenario("F57", "its state is of another type", core=steered_by(Forgetful())),
     Scenario("F57-slow", "a step takes 2 ms", alter=do.host(law_ns=2_000_000)),

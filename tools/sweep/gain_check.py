@@ -1,14 +1,18 @@
 """Verify the limits of `sim_backend.physics.gain_limits` by simulation: where a small oscillation begins to grow.
 
-The push is simulated by the world's own model (`contact.PushedSlider` with its floor), the law uses the force of the
-previous step, and a search finds the gain at which the growth rate of a small oscillation is zero.
+The push is simulated by the world's own model (`contact.PushedSlider` with its floor: Coulomb friction at support
+points for a slider that is given, else the body's d), the law uses the force of the previous step, and a search finds
+the gain at which the growth rate of a small oscillation is zero.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from math import atan2, cos, log, sin
 
+from robot_io.errors import ConfigError
+from sim_backend.physics.assumed_sliders import AssumedSlider
 from sim_backend.physics.contact import PushedSlider
 from sim_backend.physics.floor import Floor, FloorEffects
 from sim_backend.physics.gain_limits import PushedBody
@@ -29,9 +33,11 @@ LONGEST_S = 2000.0
 STICKING_FRICTION = 2.0
 
 
-def simulated_limit(body: PushedBody, k_f: float, *, frictionless: bool, near: float) -> float:
+def simulated_limit(
+    body: PushedBody, k_f: float, *, frictionless: bool, near: float, on: AssumedSlider | None = None
+) -> float:
     """Return the k_y (rad/m) at which the growth rate of a small oscillation is 0, searched from `near`."""
-    return _zero_near(lambda k_y: growth_rate(body, k_f, k_y, frictionless=frictionless), near)
+    return _zero_near(lambda k_y: growth_rate(body, k_f, k_y, frictionless=frictionless, on=on), near)
 
 
 def _zero_near(rate: Callable[[float], float], near: float) -> float:
@@ -44,16 +50,27 @@ def _zero_near(rate: Callable[[float], float], near: float) -> float:
     return low - rate_low * (high - low) / (rate_high - rate_low)
 
 
-def simulated_integral_limit(body: PushedBody, k_f: float, k_y: float, *, frictionless: bool, near: float) -> float:
+def simulated_integral_limit(
+    body: PushedBody, k_f: float, k_y: float, *, frictionless: bool, near: float, on: AssumedSlider | None = None
+) -> float:
     """Return the k_i (rad/m^2) at which the growth rate of a small oscillation is 0, searched from `near`."""
-    return _zero_near(lambda k_i: growth_rate(body, k_f, k_y, k_i, frictionless=frictionless), near)
+    return _zero_near(lambda k_i: growth_rate(body, k_f, k_y, k_i, frictionless=frictionless, on=on), near)
 
 
 def growth_rate(
-    body: PushedBody, k_f: float, k_y_rad_per_m: float, k_i_rad_per_m2: float = 0.0, *, frictionless: bool
+    body: PushedBody,
+    k_f: float,
+    k_y_rad_per_m: float,
+    k_i_rad_per_m2: float = 0.0,
+    *,
+    frictionless: bool,
+    on: AssumedSlider | None = None,
 ) -> float:
-    """Return the growth rate (1/s) of a small oscillation, from the extremes of the ball's lateral position."""
-    slider = _slider(body, 0.0 if frictionless else STICKING_FRICTION)
+    """Return the growth rate (1/s) of a small oscillation, from the extremes of the ball's lateral position.
+
+    on: the slider of that body, to be pushed on its support points.
+    """
+    slider = _slider(body, on, 0.0 if frictionless else STICKING_FRICTION)
     step_s = _step_s(body, slides=frictionless)
     x, y = -body.rho_m - body.ball_radius_m, START_OFFSET_M
     fx, fy, t = 1.0, 0.0, 0.0
@@ -83,7 +100,10 @@ def _step_s(body: PushedBody, *, slides: bool) -> float:
     return min(LONGEST_STEP_S, longest_m / SPEED_M_PER_S)
 
 
-def _slider(body: PushedBody, contact_friction: float) -> PushedSlider:
+def _slider(body: PushedBody, on: AssumedSlider | None, contact_friction: float) -> PushedSlider:
+    if on is not None:
+        with contextlib.suppress(ConfigError):  # on so small a support it tips over; the body's d has no such bound
+            return on.pushed("coulomb", contact_friction)
     shape = Circle(body.rho_m) if body.round else Rectangle(2 * body.rho_m, 2 * body.rho_m)
     model = SliderModel(shape, 1.0, body.d_m, contact_friction)
     effects = FloorEffects(shift_m=body.shift_m, along_over_across=body.along_over_across)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from sim_backend.physics.assumed_sliders import AssumedSlider
 from sim_backend.physics.gain_limits import (
     PushedBody,
     frictionless_integral_limit,
@@ -16,18 +17,22 @@ from sim_backend.physics.gain_limits import (
 from tools.sweep.gain_check import simulated_integral_limit, simulated_limit
 
 
-def check_limits(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:
-    """Simulate the limiting slider of each formula; return both limits and their relative difference."""
+def check_limits(sliders: Sequence[AssumedSlider], k_f: float) -> list[dict[str, Any]]:
+    """Simulate the limiting slider of each formula on its support points; return both limits and their difference."""
+    by_body = [(slider.body(), slider) for slider in sliders]
     formulas: dict[str, Callable[[PushedBody, float], float]] = {
         "sticking": sticking_limit,
         "frictionless": frictionless_limit,
     }
     found = []
-    for shape, chosen in (("box", [b for b in bodies if not b.round]), ("circle", [b for b in bodies if b.round])):
+    for shape, chosen in (
+        ("box", [b for b in by_body if not b[0].round]),
+        ("circle", [b for b in by_body if b[0].round]),
+    ):
         for contact, formula in formulas.items() if chosen else ():
-            body = min(chosen, key=partial(_limit_at, formula, k_f))
+            body, slider = min(chosen, key=partial(_limit_at, formula, k_f))
             expected = formula(body, k_f)
-            simulated = simulated_limit(body, k_f, frictionless=contact == "frictionless", near=expected)
+            simulated = simulated_limit(body, k_f, frictionless=contact == "frictionless", near=expected, on=slider)
             found.append(
                 {
                     "shape": shape,
@@ -42,13 +47,17 @@ def check_limits(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any
     return found
 
 
-def check_integral_limits(bodies: Sequence[PushedBody], k_f: float, k_y: float) -> list[dict[str, Any]]:
+def check_integral_limits(sliders: Sequence[AssumedSlider], k_f: float, k_y: float) -> list[dict[str, Any]]:
     """Simulate the slider that limits the integral in each kind of contact, as `check_limits` does for k_y."""
     formulas = {"sticking": sticking_integral_limit, "frictionless": frictionless_integral_limit}
     found = []
     for contact, formula in formulas.items():
-        expected, body = min(((formula(one, k_f, k_y), one) for one in bodies), key=lambda pair: pair[0])
-        simulated = simulated_integral_limit(body, k_f, k_y, frictionless=contact == "frictionless", near=expected)
+        limits = ((formula(slider.body(), k_f, k_y), slider) for slider in sliders)
+        expected, slider = min(limits, key=lambda pair: pair[0])
+        body = slider.body()
+        simulated = simulated_integral_limit(
+            body, k_f, k_y, frictionless=contact == "frictionless", near=expected, on=slider
+        )
         found.append(
             {
                 "shape": "circle" if body.round else "box",
@@ -63,5 +72,7 @@ def check_integral_limits(bodies: Sequence[PushedBody], k_f: float, k_y: float) 
     return found
 
 
-def _limit_at(formula: Callable[[PushedBody, float], float], k_f: float, body: PushedBody) -> float:
-    return formula(body, k_f)
+def _limit_at(
+    formula: Callable[[PushedBody, float], float], k_f: float, pair: tuple[PushedBody, AssumedSlider]
+) -> float:
+    return formula(pair[0], k_f)

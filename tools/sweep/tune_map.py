@@ -20,8 +20,16 @@ PRESETS = {
 """Well-known gains (k_f, k_y in rad/m) marked on the map (Heins & Schoellig, both papers and their code)."""
 
 
-def draw(limits: Sequence[tuple[float, float]], recommended: tuple[float, float], what: str) -> Figure:
-    """Draw the map. `limits`: maximum stable k_y for each k_f. `what`: the assumed sliders in a few words."""
+def draw(
+    limits: Sequence[tuple[float, float]],
+    pessimistic: Sequence[tuple[float, float]],
+    recommended: tuple[float, float],
+    what: str,
+) -> Figure:
+    """Draw the map. `limits`: maximum stable k_y for each k_f. `what`: the assumed sliders in a few words.
+
+    pessimistic: the same by the ellipsoid's resistance to turning.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -34,6 +42,8 @@ def draw(limits: Sequence[tuple[float, float]], recommended: tuple[float, float]
     axes.fill_between(k_f, k_y, top, color="tab:red", alpha=0.15, label="oscillates or diverges for some slider")
     axes.fill_between(k_f, [WARN_SHARE * v for v in k_y], k_y, color="tab:orange", alpha=0.25, label="small margin")
     axes.fill_between(k_f, 0.0, [WARN_SHARE * v for v in k_y], color="tab:green", alpha=0.2, label="stable for all")
+    low = [max(point[1], 0.0) for point in pessimistic]
+    axes.plot([point[0] for point in pessimistic], low, "k--", linewidth=1, label="pessimistic limit (ellipsoid)")
     for name, (f, y) in PRESETS.items():
         axes.plot(f, y, "ko", markersize=4)
         axes.annotate(f"{name} {f:g}/{y:g}", (f, y), textcoords="offset points", xytext=(6, 4), fontsize=8)

@@ -1,44 +1,78 @@
-"""The warning of `push run` about gains with little stability margin for the sliders its rig assumes."""
+"""How a rig's gains stand to the limits of the sliders it assumes: for the warning of `push run`, and for doctor."""
 
 from __future__ import annotations
 
-import contextlib
+import msgspec
 
 from control.laws.force_integral import IntegralSettings
-from robot_io.errors import ConfigError
 from robot_io.rig.config import ControlConfig, RigConfig
-from sim_backend.physics.assumed_sliders import pushed_body, samples
-from sim_backend.physics.floor import FloorEffects
-from sim_backend.physics.gain_limits import WARN_SHARE, PushedBody, integral_limit, limit
-from sim_backend.physics.slider import Circle, Rectangle
-from sim_backend.world.scene import slider_model
-from tools.rig import devices_at
+from sim_backend.physics.assumed_sliders import AssumedSlider, bodies, pessimistic_bodies
+from sim_backend.physics.gain_limits import WARN_SHARE, integral_limit, limit
+from tools.terminal.rig_sliders import rig_sliders
 
 GAINS_MATTER = ("force", "force-integral")
 """The laws whose gains the limits are for."""
 
 
-def gain_warning(rig: RigConfig) -> str | None:
-    """Return a warning if a rig's gains exceed 0.7 of the limit for a slider it may push, else None.
+class GainMargin(msgspec.Struct, frozen=True):
+    """The greatest stable k_y (rad/m) at the rig's k_f, and the ellipsoid's, which is pessimistic; 0: none is."""
+
+    k_y_rad_per_m: float
+    limit_rad_per_m: float
+    pessimistic_rad_per_m: float
+
+    @property
+    def words(self) -> str:
+        """Which share of the limit, and of the pessimistic one, the gain is."""
+        return f"{_share(self.k_y_rad_per_m, self.limit_rad_per_m)}{_pessimistic(self)}"
+
+
+def gain_margin(rig: RigConfig) -> GainMargin | None:
+    """Return how a rig's k_y stands to the limits; None for a law without limits, or where nothing stays upright.
 
     Raises ConfigError if the simulated slider is not possible (it would tip over).
     """
-    control, bodies = rig.control, rig_bodies(rig)
-    if control.law not in GAINS_MATTER or not bodies:
+    control, sliders = rig.control, rig_sliders(rig)
+    if control.law not in GAINS_MATTER or not sliders:
         return None
-    highest = limit(bodies, control.k_f)
-    if control.k_y_rad_per_m <= WARN_SHARE * highest:
-        return _integral_warning(control, bodies) if control.law == "force-integral" else None
-    margin = f"the limit is k_y {highest:.3g} rad/m" if highest > 0 else "no k_y is stable"
+    highest, pessimistic = (limit(some, control.k_f) for some in (bodies(sliders), pessimistic_bodies(sliders)))
+    return GainMargin(control.k_y_rad_per_m, max(highest, 0.0), max(pessimistic, 0.0))
+
+
+def gain_warning(rig: RigConfig) -> str | None:
+    """Return a warning if a rig's gains exceed 0.7 of the limit for a slider it may push, else None.
+
+    Raises ConfigError as `gain_margin`.
+    """
+    control, margin = rig.control, gain_margin(rig)
+    if margin is None:
+        return None
+    if control.k_y_rad_per_m <= WARN_SHARE * margin.limit_rad_per_m:
+        return _integral_warning(control, rig_sliders(rig)) if control.law == "force-integral" else None
     return (
-        f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may oscillate: for the sliders of this rig at this k_f "
-        f"{margin}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds better ones"
+        f"gains {control.k_f:g}/{control.k_y_rad_per_m:g} may oscillate: for the sliders of this rig k_y is "
+        f"{margin.words}, and beyond {WARN_SHARE:g} of it there is little margin; `push tune` finds better ones"
     )
 
 
-def _integral_warning(control: ControlConfig, bodies: list[PushedBody]) -> str | None:
+def _share(k_y: float, highest: float) -> str:
+    return (
+        f"{k_y / highest:.2f} of the limit {highest:.3g} rad/m" if highest > 0 else "beyond the limit: none is stable"
+    )
+
+
+def _pessimistic(margin: GainMargin) -> str:
+    if margin.limit_rad_per_m <= 0 or margin.pessimistic_rad_per_m >= margin.limit_rad_per_m:
+        return ""
+    if margin.pessimistic_rad_per_m <= 0:
+        return " (by the pessimistic one none is stable)"
+    share = margin.k_y_rad_per_m / margin.pessimistic_rad_per_m
+    return f" ({share:.2f} of the pessimistic one, {margin.pessimistic_rad_per_m:.3g})"
+
+
+def _integral_warning(control: ControlConfig, sliders: list[AssumedSlider]) -> str | None:
     k_i = float(str(control.law_settings.get("k_i_rad_per_m2", IntegralSettings().k_i_rad_per_m2)))
-    highest = integral_limit(bodies, control.k_f, control.k_y_rad_per_m)
+    highest = integral_limit(bodies(sliders), control.k_f, control.k_y_rad_per_m)
     if k_i <= WARN_SHARE * highest:
         return None
     return (
@@ -46,23 +80,3 @@ def _integral_warning(control: ControlConfig, bodies: list[PushedBody]) -> str |
         f"limit is {highest:.2g}, and beyond {WARN_SHARE:g} of it there is little margin; "
         "`push tune --law force-integral` finds a better one"
     )
-
-
-def rig_bodies(rig: RigConfig) -> list[PushedBody]:
-    """Return the sliders of `[sliders]`, and the simulated one if there is one."""
-    world, pressure = rig.world, rig.sliders.pressure
-    effects = FloorEffects(
-        shift_m=world.slider.floor_friction * world.floor.push_height_m,
-        turning=world.floor.turning,
-        along_over_across=world.floor.along_over_across,
-    )
-    bodies = []
-    for length in samples(rig.sliders.shortest_m, rig.sliders.longest_m):
-        for outline in (Rectangle(length, length), Circle(length / 2)):
-            with contextlib.suppress(ConfigError):  # it would tip over: nobody pushes it at that height
-                bodies.append(pushed_body(outline, pressure, effects, world.ball_radius_m))
-    if not devices_at(rig, "hardware"):
-        shape = slider_model(world.slider).shape
-        assert isinstance(shape, Circle | Rectangle)
-        bodies.append(pushed_body(shape, world.slider.pressure, effects, world.ball_radius_m))
-    return bodies

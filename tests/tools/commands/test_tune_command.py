@@ -6,9 +6,9 @@ import pytest
 
 from robot_io.errors import ConfigError
 from robot_io.rig.config import load_rig
-from sim_backend.physics.gain_limits import PushedBody, fast_loop_k_f, limit
+from sim_backend.physics.gain_limits import PushedBody, limit
 from tools import cli
-from tools.terminal.gain_warning import gain_warning
+from tools.terminal.gain_warning import gain_margin, gain_warning
 
 
 def tune(capsys, *argv):
@@ -18,29 +18,47 @@ def tune(capsys, *argv):
     return code, json.loads(out.splitlines()[-1]), err
 
 
+HEIGHT = ("--push-height-m", "0.15")
+
+
 def test_a_recommendation_with_its_margin_costs_and_map(tmp_path, capsys):
-    code, result, err = tune(capsys, "--out", tmp_path / "out", "--no-check")
+    """By hand for the box of 0.5 m: 0.3 x 0.2 / (0.25^2 / 3 - 0.045^2 + 0.25 x 0.295); the ellipsoid has d 0.1913 m."""
+    code, result, err = tune(capsys, "--out", tmp_path / "out", "--no-check", *HEIGHT)
     assert code == 0
-    k_f, k_y = result["recommended"]["k_f"], result["recommended"]["k_y_rad_per_m"]
-    assert k_f == 0.28  # half of where the force angle of the rim-loaded box runs away
-    assert 0.45 < result["share_of_limit"] <= 0.5
-    assert result["margin"] == pytest.approx(result["limit_k_y_rad_per_m"] / k_y)
-    assert result["offset_m_per_degree"] == pytest.approx((1 + k_f) / k_y * 0.0174533, rel=1e-5)
-    assert result["offset_m_per_newton"] == pytest.approx((1 + k_f) / k_y / 15)
-    assert "recommended" in err
+    assert result["limit_k_y_rad_per_m"] == pytest.approx(0.6482, abs=1e-4)
+    assert result["pessimistic_limit_k_y_rad_per_m"] == pytest.approx(0.5438, abs=1e-4)
+    assert result["recommended"] == {"k_f": 0.3, "k_y_rad_per_m": 0.32}
+    assert result["margin"] == pytest.approx(0.6482 / 0.32, abs=1e-3)
+    assert result["offset_m_per_degree"] == pytest.approx(1.3 / 0.32 * 0.0174533, rel=1e-5)
+    assert result["offset_m_per_newton"] == pytest.approx(1.3 / 0.32 / 15)
+    assert "the pessimistic limit is 0.544 rad/m" in err
     assert result["checks_passed"] is None
     for name in result["files"]:
         assert (tmp_path / "out" / name).stat().st_size > 5000
     shares = {preset["name"]: preset["share_of_limit"] for preset in result["presets"]}
+    assert shares["rig emulated"] == pytest.approx(0.3085, abs=1e-4)
     assert shares["paper, hardware"] > 1 > shares["paper, simulation"]
+
+
+def test_pressure_at_the_corners_leaves_the_shipped_gains_their_margin(tmp_path, capsys):
+    """By hand for the box of 0.7 m: d^2 is 0.35^2 - 0.045^2 along the push and twice 0.35^2 by the ellipsoid."""
+    _, result, _ = tune(
+        capsys, "--out", tmp_path / "out", "--no-check", "--size-m", "0.3,0.7", "--pressures", "uniform,rim", *HEIGHT
+    )
+    assert result["limit_k_y_rad_per_m"] == pytest.approx(0.3479, abs=1e-4)
+    assert result["pessimistic_limit_k_y_rad_per_m"] == pytest.approx(0.2348, abs=1e-4)
+    assert result["recommended"] == {"k_f": 0.3, "k_y_rad_per_m": 0.17}
+    [shipped] = [entry for entry in result["presets"] if entry["name"] == "rig emulated"]
+    assert shipped["share_of_limit"] == pytest.approx(0.575, abs=0.001)
+    assert shipped["share_of_pessimistic_limit"] == pytest.approx(0.85, abs=0.005)
 
 
 def test_one_slider_gives_its_own_limit(tmp_path, capsys):
     _, result, _ = tune(
         capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "circle", "--size-m", "0.5,0.5",
-        "--pressures", "rim", "--turning", "along-push", "--floor-friction", "0.3", "--anisotropy", "1.05",
+        "--pressures", "rim", "--floor-friction", "0.3", "--anisotropy", "1.05", *HEIGHT,
     )  # fmt: skip
-    body = PushedBody(True, 0.25, 0.25 / 2**0.5, 0.05, 0.045, 1.05)
+    body = PushedBody(True, 0.25, (0.25**2 / 2 - 0.045**2) ** 0.5, 0.05, 0.045, 1.05)
     assert result["assumed"] == 1
     assert result["limit_k_y_rad_per_m"] == pytest.approx(limit([body], 0.3))
     at = {entry["k_f"]: entry["k_y_rad_per_m"] for entry in result["limits"]}
@@ -49,16 +67,29 @@ def test_one_slider_gives_its_own_limit(tmp_path, capsys):
 
 
 def test_k_f_stays_clear_of_the_fast_loop(tmp_path, capsys):
+    """On its corners a box of 0.7 m lets the force run away from 1.15 on, by the ellipsoid from half that."""
     _, result, err = tune(
-        capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "box", "--size-m", "0.3,0.3",
-        "--width-m", "0.7,0.7", "--pressures", "rim",
+        capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "box", "--size-m", "0.7,0.7",
+        "--pressures", "corners", "--k-f", "0.8", *HEIGHT,
     )  # fmt: skip
-    assert result["recommended"]["k_f"] < 0.3
-    assert "k_f 0.3 is not used" in err
-    assert result["recommended"]["k_f"] <= 0.5 * result["fast_loop_k_f"]
-    body = PushedBody(False, 0.15, (0.15**2 + 0.35**2) ** 0.5, 0.05, 0.045)
-    assert result["fast_loop_k_f"] == pytest.approx(fast_loop_k_f([body]))
-    assert limit([body], 1.01 * result["fast_loop_k_f"]) == 0
+    assert result["fast_loop_k_f"] == pytest.approx(1.1475, abs=1e-4)
+    assert result["pessimistic_fast_loop_k_f"] == pytest.approx(0.5643, abs=1e-4)
+    assert result["recommended"]["k_f"] == 0.57
+    assert "k_f 0.8 is not used" in err
+    assert limit([PushedBody(False, 0.35, 0.35, 0.05, 0.045)], 1.01 * result["fast_loop_k_f"]) == 0
+
+
+def test_tune_the_warning_and_doctor_judge_by_the_same(tmp_path, capsys):
+    """A range of the rig binds all three, and so does a value of it that is set for once."""
+    words = ("sliders.longest_m=0.9", "world.floor.push_height_m=0.1", "control.k_y_rad_per_m=0.4")
+    _, result, _ = tune(
+        capsys, "sim", *(w for word in words for w in ("--set", word)), "--no-check", "--out", tmp_path / "out"
+    )
+    rig = load_rig("sim", words)
+    margin = gain_margin(rig)
+    assert margin.limit_rad_per_m == result["limit_k_y_rad_per_m"]
+    assert margin.pessimistic_rad_per_m == result["pessimistic_limit_k_y_rad_per_m"]
+    assert f"{0.4 / result['limit_k_y_rad_per_m']:.2f} of the limit" in gain_warning(rig)
 
 
 @pytest.mark.long
@@ -121,9 +152,9 @@ def test_a_full_folder_is_left_alone(tmp_path, capsys):
 
 def test_run_warns_of_an_integral_with_little_margin_only():
     assert gain_warning(load_rig("sim", ["control.law=force-integral"])) is None
-    told = gain_warning(load_rig("sim", ["control.law=force-integral", "control.law_settings.k_i_rad_per_m2=0.08"]))
+    told = gain_warning(load_rig("sim", ["control.law=force-integral", "control.law_settings.k_i_rad_per_m2=0.1"]))
     assert told is not None
-    assert "k_i 0.08" in told
+    assert "k_i 0.1" in told
 
 
 def test_run_warns_of_gains_with_little_margin_only():
@@ -139,13 +170,13 @@ def test_run_warns_of_gains_with_little_margin_only():
 
 
 def test_run_warns_for_the_whole_range_of_sliders_that_the_rig_assumes():
-    """Sticking box of length L, ball R, uniform: k_y < k_f (L/2 - R) / (d^2 + L^2/4), d = 0.3826 L."""
-    limit_1m = 0.3 * (0.5 - 0.05) / (0.382598**2 + 0.25)
+    """Sticking box of length L, ball R, uniform, at height 0: k_y < k_f (L/2 - R) / (d^2 + L^2/4), d^2 = L^2/12."""
+    limit_1m = 0.3 * (0.5 - 0.05) / (1 / 12 + 0.25)
     for share, warned in ((0.68, False), (0.72, True)):
-        settings = [f"control.k_y_rad_per_m={share * limit_1m}", "sliders.longest_m=1.0"]
+        settings = [f"control.k_y_rad_per_m={share * limit_1m}", "sliders.longest_m=1.0", "world.floor.push_height_m=0"]
         for rig in ("sim", "thing"):
             assert (gain_warning(load_rig(rig, settings)) is not None) == warned
-            assert gain_warning(load_rig(rig, settings[:1])) is None
+            assert gain_warning(load_rig(rig, settings[:1] + settings[2:])) is None
     simulated = gain_warning(load_rig("sim", ["world.slider.length_m=3", "world.slider.width_m=3"]))
     real = gain_warning(load_rig("thing", ["world.slider.length_m=3", "world.slider.width_m=3"]))
     assert simulated is not None  # no box of the range, but the one that is there

@@ -9,9 +9,10 @@ import numpy as np
 
 from robot_io.rig.config import RigConfig
 from robot_io.tick import Phase
+from sim_backend.physics.assumed_sliders import bodies
 from sim_backend.physics.gain_limits import decay_per_m
 from tools.report.run_data import RunData
-from tools.terminal.gain_warning import rig_bodies
+from tools.terminal.rig_sliders import rig_sliders
 
 SHORTEST_M = 1.0
 """A shorter push says nothing of where it would have settled."""
@@ -65,7 +66,7 @@ def force_angle(run: RunData) -> ForceAngle | None:
     if not len(before) or not force_N > control.force_min_N:
         return None
     peak = before[np.argmax(np.abs(angle[before]))]
-    rate = decay_per_m(rig_bodies(run.rig), control.k_f, control.k_y_rad_per_m)
+    rate = decay_per_m(bodies(rig_sliders(run.rig)), control.k_f, control.k_y_rad_per_m)
     left = math.exp(-rate * float(along[last][0] - along[peak])) * _mean_decay(rate * over_m)
     residual_N = run.last.after.control.residual_N
     tare_N = max(tare_error_newtons(run.rig), residual_N if math.isfinite(residual_N) else 0.0)
