@@ -64,6 +64,11 @@ class McapWriter:
         self._put(MAGIC)
         self._put(_bytes(Header(profile, library)))
 
+    @property
+    def size_bytes(self) -> int:
+        """Number of bytes written, without the chunk in progress."""
+        return self._at
+
     def register_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Declare a schema and return its number."""
         self._schemas.append(Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name))

@@ -80,7 +80,8 @@ class VerifiedLog:
         )
 
     @property
-    def _end_facts(self) -> dict[str, str]:
+    def end_facts(self) -> dict[str, str]:
+        """What was known at the end of the log, or when it was recovered."""
         return self._end if self._end is not None else self._saved or {}
 
     @property
@@ -112,7 +113,7 @@ class VerifiedLog:
 
     def messages(self) -> Iterator[Item]:
         """Yield every message in file order. Read all before trusting any: the end may raise LogDamaged."""
-        chain, seal = TickChain(), seal_of(self._end_facts, self.made_by.format)
+        chain, seal = TickChain(), seal_of(self.end_facts, self.made_by.format)
         for channel in self.channels:
             seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
         last = -1
@@ -126,11 +127,10 @@ class VerifiedLog:
         self._check_end(chain, seal, last)
 
     def _is_config_intact(self, summary: LogSummary) -> bool:
-        if self._end_facts and self.made_by.format == 1 and CONFIG_FACT not in self._end_facts:
+        if self.end_facts and self.made_by.format == 1 and CONFIG_FACT not in self.end_facts:
             return True  # format 1 did not seal it, as the notes say
         return (
-            self._end_facts.get(CONFIG_FACT)
-            == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
+            self.end_facts.get(CONFIG_FACT) == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
         )
 
     def _read_rig(self, summary: LogSummary) -> RigConfig | str:
@@ -147,9 +147,9 @@ class VerifiedLog:
 
     def _seal_notes(self) -> list[str]:
         """Return what the seal of a log of the first format does not cover."""
-        if self.made_by.format > 1 or "message_sum" in self._end_facts:
+        if self.made_by.format > 1 or "message_sum" in self.end_facts:
             return []
-        what = "types and times of messages" if "payload_sum" in self._end_facts else "messages but ticks"
+        what = "types and times of messages" if "payload_sum" in self.end_facts else "messages but ticks"
         return [f"the log's seal does not cover its config.toml, nor {what}"]
 
     def _tick(self, message: LogMessage, last: int, chained: bool) -> ControlTick:
@@ -172,7 +172,7 @@ class VerifiedLog:
             raise LogDamaged(
                 "the log contains no ticks", where=str(self.path), do="The run ended before its loop started"
             )
-        wanted = self._end_facts
+        wanted = self.end_facts
         if self._end is not None:
             ticks = {"ticks": str(chain.ticks), "last_tick_crc32": f"{chain.crc32:08x}"}
             if any(wanted.get(name) != value for name, value in ticks.items()):

@@ -182,9 +182,9 @@ def test_what_was_pushed_is_in_the_log_with_what_is_derived_from_it(run):
         "/ft/wrench": 120,
         "/base/cmd_vel_raw": 120,
         "/base/cmd_vel": 120,
-        "/loop/timing": 120,
+        "/loop/timing": 2,  # one a second
         "/arm/joint_states": 120,
-        "/arm/status": 120,
+        "/arm/status": 3,  # one a second of its own time, which begins before the first tick
         "/control/signals": 120,
         "/tf": 120,
         "/diagnostics": 2,
@@ -224,7 +224,7 @@ def test_derived_values_and_times_read_by_rosbags(run):
     assert (tf.transforms[0].transform.translation.x, tf.transforms[0].transform.translation.y) == (0.008, 0.25)
     assert [event.kind for _, event in seen["/safety/event"]] == ["mode", "fault", "cleared"]
     assert seen["/safety/event"][1][1].text == "ticks of the loop were skipped"
-    assert seen["/loop/timing"][5][1].late_ns == 90_000
+    assert seen["/loop/timing"][0][1].late_ns == 90_000
     assert seen["/control/tick"][8][1].input.base.pose.yaw == 0.5
 
 
@@ -343,7 +343,7 @@ def flushed_ticks(path: Path) -> int:
     count = 0
     try:
         for item in walk(path, finished=False):
-            count += isinstance(item, McapMessage) and len(item.data) > 1500  # only ticks are that large
+            count += isinstance(item, McapMessage) and len(item.data) > 1000  # only ticks are that large
     except LogDamaged:
         return count
     return count
