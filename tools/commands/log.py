@@ -223,14 +223,20 @@ def _recover(args: argparse.Namespace) -> dict[str, Any]:
 def _recover_parts(log: Path, out: Path) -> dict[str, Any]:
     """Repair the parts that need it, and copy the others. Raises UsageError if none does, and as `recover`."""
     messages, causes = 0, dict[str, str]()
-    made: list[Path] = []
+    files, made = files_of(log), list[Path]()
     try:
-        for number, file in enumerate(files_of(log), 1):
+        for number, file in enumerate(files, 1):
             target = part_path(out, number)
             try:
                 messages += read_summary(file).messages
             except LogDamaged:
-                saved = recover(file, target)
+                try:
+                    saved = recover(file, target)
+                except LogDamaged as damage:
+                    if number == 1 or number < len(files):
+                        raise
+                    causes[file.name] = damage.what  # it had only just begun: there is nothing in it
+                    continue
                 messages += saved.messages
                 causes[file.name] = saved.cause
             else:

@@ -78,7 +78,9 @@ def tick_payload(n: int) -> bytes:
 class Run:
     """A recorder with its rings and pipes, as the launcher sets it up."""
 
-    def __init__(self, out: Path, names: tuple[str, ...] = ("control", "gate"), capacity: int = 1 << 22) -> None:
+    def __init__(
+        self, out: Path, names: tuple[str, ...] = ("control", "gate"), capacity: int = 1 << 22, config: str = CONFIG
+    ) -> None:
         self.out = out
         self.rings = {name: Ring.create(name, capacity) for name in names}
         pipes = [os.pipe() for _ in names]
@@ -87,7 +89,7 @@ class Run:
         ends = [pipe[0] for pipe in pipes]
         job = {
             "out_path": str(out),
-            "config_text": CONFIG,
+            "config_text": config,
             "metadata": {"seed": "4"},
             "wall_offset_ns": OFFSET_NS,
             "rings": [{"name": name, "fd": ring.fd} for name, ring in self.rings.items()],
