@@ -20,10 +20,9 @@ from tools.log.run_parts import SINCE_FACT
 from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplayer
 from tools.replay.derived import DerivedReplay, DerivedReplayer
 from tools.replay.law import law_of, with_law_source
-from tools.replay.part_order import in_order
 from tools.replay.result import ReplayResult, all_derived, notes_of
 from tools.replay.ticks import TickReplayer
-from tools.replay.verified_log import VerifiedLog
+from tools.replay.verified_log import VerifiedLog, in_order
 from tools.replay.world import PREFIX, WorldReplayer, WorldTypes
 from tools.run.tick_core import TickCore
 

@@ -18,8 +18,7 @@ from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, Phase
 from safety import limits
 from tools.replay.law import core_maker
-from tools.replay.part_order import in_order
-from tools.replay.verified_log import VerifiedLog
+from tools.replay.verified_log import VerifiedLog, in_order
 from tools.replay.what_if_keys import other_rig
 from tools.replay.what_if_sides import PARTS, Change, End, OtherFault, Part, PartResult, Side, parts_of
 from tools.run.tick_core import TickCore
