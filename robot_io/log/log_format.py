@@ -14,7 +14,7 @@ from robot_io.log.format_1 import arm_state
 from robot_io.log.format_2 import always, sums_count
 from robot_io.log.format_3 import not_kept
 
-LOG_FORMAT = 4
+LOG_FORMAT = 5
 FORMAT_FACT = "format"
 """Where a log's metadata `run` says its format; the first one said nothing."""
 _FIRST_FORMAT = 1

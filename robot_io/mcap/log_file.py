@@ -75,6 +75,15 @@ class McapLog:
         self._sequences[topic] = sequence + 1
         self.messages += 1
 
+    @property
+    def size_bytes(self) -> int:
+        """Number of bytes that have left this process; what has not been flushed is not among them."""
+        return self._writer.size_bytes
+
+    def fileno(self) -> int:
+        """Return the descriptor of the file."""
+        return self._stream.fileno()
+
     def flush(self) -> None:
         """Hand everything to the operating system: it then survives the death of this process."""
         self._writer.flush()

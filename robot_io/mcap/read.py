@@ -1,4 +1,4 @@
-"""Reads a finished, verified log: its messages one by one, or a summary of what it holds.
+"""Reads a finished, verified log, in one file or in parts: its messages one by one, or a summary of what it holds.
 
 for topic, log_time_ns, payload, schema_name in read_log(Path("run.mcap")): ...
 """
@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 from mcap.records import Attachment, Message, Metadata
 
-from robot_io.mcap.walk import Topic, walk
+from robot_io.mcap.files import files_of
+from robot_io.mcap.walk import LogItem, Topic, walk
 
 _LATCHED = re.compile(r"\bdurability: *(1|transient_local)\b")
 """In the quality of service of a channel, as rmw numbers or names it."""
@@ -52,14 +53,20 @@ class LogSummary(NamedTuple):
     end_ns: int
 
 
+def walk_all(path: Path) -> Iterator[LogItem]:
+    """Yield the verified records of all files of a finished log; each part declares its topics anew. As `walk`."""
+    for file in files_of(path):
+        yield from walk(file)
+
+
 def read_log(path: Path) -> Iterator[LogMessage]:
-    """Yield every message of a finished log, in the order of the file.
+    """Yield every message of a finished log, in the order of the file; of a log in parts, one part after another.
 
     Raises UsageError when there is no such file, LogDamaged at the latest at the end: read all of it before you
     trust any of it.
     """
     names: dict[int, tuple[str, str]] = {}
-    for item in walk(path):
+    for item in walk_all(path):
         if isinstance(item, Message):
             topic, schema_name = names[item.channel_id]
             yield LogMessage(topic, item.log_time, item.data, schema_name)
@@ -68,7 +75,40 @@ def read_log(path: Path) -> Iterator[LogMessage]:
 
 
 def read_summary(path: Path) -> LogSummary:
-    """Read a finished log to its end and return what it holds. Raises as `read_log`."""
+    """Read a finished log to its end and return what it holds. Raises as `read_log`.
+
+    Of a log in parts, counts and times are those of all; facts and attachments are the newest of each name.
+    """
+    files = files_of(path)
+    summaries = [_read_summary(file) for file in files]
+    return summaries[0] if len(files) == 1 else _together(summaries)
+
+
+def _together(parts: list[LogSummary]) -> LogSummary:
+    channels: dict[tuple[str, ...], ChannelInfo] = {}
+    metadata: dict[str, dict[str, str]] = {}
+    attachments: dict[str, bytes] = {}
+    for part in parts:
+        metadata |= part.metadata
+        attachments |= part.attachments
+        for one in part.channels:
+            key = (one.topic, one.schema_name, one.schema_text, one.message_encoding, one.schema_encoding)
+            known = channels.get(key)
+            channels[key] = one if known is None else one._replace(messages=known.messages + one.messages)
+    filled = [part for part in parts if part.messages]
+    return LogSummary(
+        sum(part.size_bytes for part in parts),
+        parts[0].library,
+        tuple(channels.values()),
+        attachments,
+        metadata,
+        sum(part.messages for part in parts),
+        min((part.start_ns for part in filled), default=0),
+        max((part.end_ns for part in filled), default=0),
+    )
+
+
+def _read_summary(path: Path) -> LogSummary:
     library, attachments, metadata = "", {}, {}
     topics: list[Topic] = []
     counts: dict[int, int] = {}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterable
 from typing import BinaryIO
 
 import zstandard
@@ -52,7 +53,9 @@ class McapWriter:
         self._crc = 0
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunks: list[ChunkIndex] = []
+        self._chunks = bytearray()
+        """Their indexes as the summary has them: as records they would take ten times as much for an hour."""
+        self._chunk_count = 0
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._counts: dict[int, int] = {}
@@ -63,6 +66,11 @@ class McapWriter:
         """Of the open chunk: channel -> time and offset of each message, in turns."""
         self._put(MAGIC)
         self._put(_bytes(Header(profile, library)))
+
+    @property
+    def size_bytes(self) -> int:
+        """Number of bytes written, without the chunk in progress."""
+        return self._at
 
     def register_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Declare a schema and return its number."""
@@ -149,7 +157,8 @@ class McapWriter:
             head = _INDEX.pack(Opcode.MESSAGE_INDEX, 2 + 4 + size, channel_id, size)
             self._put(head + struct.pack(f"<{len(entry)}Q", *entry))
             self._counts[channel_id] = self._counts.get(channel_id, 0) + len(entry) // 2
-        self._chunks.append(
+        self._chunk_count += 1
+        self._chunks += _bytes(
             ChunkIndex(
                 chunk_length=index_at - chunk_at,
                 chunk_start_offset=chunk_at,
@@ -169,7 +178,7 @@ class McapWriter:
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
-            chunk_count=len(self._chunks),
+            chunk_count=self._chunk_count,
             message_count=sum(self._counts.values()),
             message_end_time=self._end_ns,
             message_start_time=self._start_ns or 0,
@@ -177,19 +186,22 @@ class McapWriter:
             schema_count=len(self._schemas),
         )
         groups = (
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [statistics]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, self._attachments),
-            (Opcode.METADATA_INDEX, self._metadata),
+            (Opcode.SCHEMA, _all_bytes(self._schemas)),
+            (Opcode.CHANNEL, _all_bytes(self._channels)),
+            (Opcode.STATISTICS, _bytes(statistics)),
+            (Opcode.CHUNK_INDEX, bytes(self._chunks)),
+            (Opcode.ATTACHMENT_INDEX, _all_bytes(self._attachments)),
+            (Opcode.METADATA_INDEX, _all_bytes(self._metadata)),
         )
         summary = offsets = b""
-        for opcode, records in groups:
-            group = b"".join(map(_bytes, records))
+        for opcode, group in groups:
             offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(group)))
             summary += group
         return summary, offsets
+
+
+def _all_bytes(records: Iterable[McapRecord]) -> bytes:
+    return b"".join(map(_bytes, records))
 
 
 def _bytes(record: McapRecord) -> bytes:

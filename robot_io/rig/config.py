@@ -23,7 +23,7 @@ from robot_io.rig.calibration import CalibrationConfig
 from robot_io.rig.checks import build
 from robot_io.rig.declared import FT300_FACTS
 from robot_io.rig.renames import name_today
-from robot_io.rig.task import FaultsConfig, GoalConfig, PathConfig, SlidersConfig, WorkspaceConfig
+from robot_io.rig.task import FaultsConfig, GoalConfig, LogConfig, PathConfig, SlidersConfig, WorkspaceConfig
 from robot_io.rig.topics import TopicsConfig
 from robot_io.rig.types import InBase, Joints, LawFacts, Level, Matrix3, NonNegative, Options, Positive, Table
 from robot_io.rig.world import WorldConfig
@@ -206,6 +206,7 @@ class RigConfig(Table, frozen=True):
     limits: LimitsConfig = LimitsConfig()
     workspace: WorkspaceConfig = WorkspaceConfig()
     goal: GoalConfig = GoalConfig()
+    log: LogConfig = LogConfig()
     calibration: CalibrationConfig = CalibrationConfig()
     world: WorldConfig = WorldConfig()
     faults: FaultsConfig = FaultsConfig()

@@ -78,6 +78,22 @@ class GoalConfig(Table, frozen=True):
     """How far it may be at the end. A push that starts further off may end as far off as it started."""
 
 
+class LogConfig(Table, frozen=True):
+    """What is recorded, and into how many files (docs/logs.md)."""
+
+    topics: Literal["all", "lean"] = "all"
+    """`lean`: topics that are derived for viewers come 25 times a second instead of in every tick."""
+    split_minutes: Annotated[float, Meta(ge=0, le=1440)] = 0.0
+    """Begin a new file after so many minutes, `run_001.mcap`, `run_002.mcap`, ...; 0: one file, `run.mcap`."""
+    split_MB: Annotated[float, Meta(ge=0, le=100_000)] = 0.0
+    """Begin a new file once this one has so many megabytes; 0: no matter how large."""
+
+    @property
+    def in_parts(self) -> bool:
+        """Whether there may be more than one file."""
+        return self.split_minutes > 0 or self.split_MB > 0
+
+
 class FaultsConfig(Table, frozen=True):
     """Faults to inject at levels sim and emulated, for rehearsals and tests (docs/faults.md)."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from robot_io.tick.control_state import REST_M_PER_S, REST_NS, ContactState, ControlState, Phase, TareSums
 from robot_io.tick.field_types import Counts6
 from robot_io.tick.input import FtInput, FtReading, HostInput, Operator, TickInput, link_number
-from robot_io.tick.record import TICK_CDR, ControlTick, TickOutput, TickState
+from robot_io.tick.record import SHORTENED, TICK_CDR, ControlTick, TickOutput, TickState, shortened
 from robot_io.tick.safety_state import (
     ClockState,
     EnvelopeState,
@@ -25,6 +25,7 @@ from robot_io.tick.safety_state import (
 __all__ = [
     "REST_M_PER_S",
     "REST_NS",
+    "SHORTENED",
     "TICK_CDR",
     "ClockState",
     "ContactState",
@@ -48,4 +49,5 @@ __all__ = [
     "TickState",
     "WorkspaceState",
     "link_number",
+    "shortened",
 ]

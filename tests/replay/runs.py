@@ -18,8 +18,10 @@ from msgspec.structs import replace
 
 from robot_io.log.seal import LogSeal
 from robot_io.mcap.read import read_summary
+from robot_io.rig.config import rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.cli import main
+from tools.run.tick_core import TickCore
 
 ROOT = Path(__file__).resolve().parents[2]
 PUSH = "import sys; from tools.cli import main; sys.exit(main(sys.argv[1:]))"
@@ -146,7 +148,7 @@ def with_input(tick: ControlTick, **parts: Any) -> ControlTick:
 
 
 def ticks_in(path: Path) -> list[ControlTick]:
-    """Return the ticks of a log, each with the state before it, so that a log may begin with any."""
+    """Return the ticks of a log, each with the whole state before and after it, so that a log may begin with any."""
     found: list[ControlTick] = []
 
     def look(messages: Messages) -> Messages:
@@ -154,9 +156,12 @@ def ticks_in(path: Path) -> list[ControlTick]:
         return []
 
     rewritten(path, Path(os.devnull), look)
+    facts = read_summary(path)
+    core = TickCore.of(rig_from_toml(facts.attachments["config.toml"].decode()))
     for i, tick in enumerate(found):
-        if not tick.before:
-            found[i] = replace(tick, before=(found[i - 1].after,))
+        before = tick.before or (found[i - 1].after,)
+        after, _ = core.fold(before[0], tick.input)
+        found[i] = replace(tick, reserved=0, before=before, after=after)
     return found
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -19,6 +20,7 @@ from robot_io.clock import NS_PER_S
 from robot_io.error_report import SCHEMA, printable, say_json, tell
 from robot_io.errors import EnvironmentFault, LogDamaged, UsageError
 from robot_io.log.recovery import recover
+from robot_io.mcap.files import files_of, has_parts, part_path
 from robot_io.mcap.read import LogSummary, read_summary
 from tools.commands import log_zip
 from tools.log.decode import Decoders, columns
@@ -84,9 +86,13 @@ def _info(args: argparse.Namespace) -> dict[str, Any]:
     summary = read_summary(args.log)
     duration_s = (summary.end_ns - summary.start_ns) / NS_PER_S
     unreadable = Decoders(summary, None).unreadable
+    files = [file.name for file in files_of(args.log)]
     if not args.json:
         print(_table(args.named, summary, duration_s, unreadable))
+        if len(files) > 1:
+            print(f"in {len(files)} parts: {files[0]} to {files[-1]}")
     return {
+        **({"parts": files} if len(files) > 1 else {}),
         "size_bytes": summary.size_bytes,
         "messages": summary.messages,
         "start_ns": summary.start_ns,
@@ -207,9 +213,54 @@ def _write_tables(decoders: Decoders, log: Path, out: Path, start_ns: int, rows:
 
 def _recover(args: argparse.Namespace) -> dict[str, Any]:
     out: Path = args.out or args.log.with_name(f"{args.log.stem}_recovered.mcap")
+    if has_parts(args.log):
+        return _recover_parts(args.log, out)
     saved = recover(args.log, out)
     tell(f"{out}: {saved.messages} messages saved ({saved.cause})")
     return {"out": str(out), "messages": saved.messages, "cause": saved.cause}
+
+
+def _recover_parts(log: Path, out: Path) -> dict[str, Any]:
+    """Repair the parts that need it, and copy the others. Raises UsageError if none does, and as `recover`."""
+    messages, causes = 0, dict[str, str]()
+    files, made = files_of(log), list[Path]()
+    try:
+        for number, file in enumerate(files, 1):
+            target = part_path(out, number)
+            try:
+                messages += read_summary(file).messages
+            except LogDamaged:
+                try:
+                    saved = recover(file, target)
+                except LogDamaged as damage:
+                    if number == 1 or number < len(files):
+                        raise
+                    causes[file.name] = damage.what  # it had only just begun: there is nothing in it
+                    continue
+                messages += saved.messages
+                causes[file.name] = saved.cause
+            else:
+                _copy_new(file, target)
+            made.append(target)
+        if not causes:
+            raise UsageError("the log is intact; there is nothing to recover", where=str(log))
+    except BaseException:
+        for target in made:
+            target.unlink(missing_ok=True)
+        raise
+    words = "; ".join(f"{name}: {cause}" for name, cause in causes.items())
+    tell(f"{made[0]} to {made[-1].name}: {messages} messages saved ({words})")
+    return {"out": str(out), "parts": [one.name for one in made], "messages": messages, "cause": words}
+
+
+def _copy_new(file: Path, target: Path) -> None:
+    if target.exists():
+        raise UsageError("there is already a file of this name", where=str(target), do="Give another name with --out")
+    try:
+        shutil.copyfile(file, target)
+    except OSError as error:
+        target.unlink(missing_ok=True)
+        raise EnvironmentFault(f"the log cannot be written: {error.strerror}", where=str(target)) from None
 
 
 def _report_unreadable(decoders: Decoders, args: argparse.Namespace, messages: int) -> dict[str, str]:

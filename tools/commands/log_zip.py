@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     out: Path = args.out or top.with_name(f"{top.resolve().name}.zip")
     if not top.is_dir():
         raise UsageError("this is not a folder", where=str(top), do="Name a run's folder, or one with runs in it")
-    logs = sorted(top.rglob("run.mcap"))
+    logs = sorted({file for name in ("run.mcap", "run_[0-9]*.mcap") for file in top.rglob(name)})
     if not logs:
         raise UsageError("there is no run.mcap in this folder or below it", where=str(top), do="Name another")
     if out.exists():

@@ -13,8 +13,11 @@ from robot_io.errors import ReplayDiffers, UsageError
 from robot_io.log.log_format import FORMAT_FACT
 from tools.places.find_log import find_log
 from tools.replay import what_if_report
+from tools.replay.base_inputs import BaseInputsReplay
+from tools.replay.derived import DerivedReplay
 from tools.replay.difference import Difference
-from tools.replay.fold import ReplayResult, replay
+from tools.replay.fold import replay
+from tools.replay.result import ReplayResult
 from tools.replay.what_if import what_if
 from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
 from tools.run.facts.run_facts import code_and_machine
@@ -35,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tolerance", type=number(0, 1e6), metavar="X", help="accept differences up to X (log from another machine)"
     )
+    parser.add_argument("--ticks", action="store_true", help="the ticks alone: neither the world nor derived topics")
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
 
 
@@ -43,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     path = find_log(args.log)
     if args.what_if:
         return answer_what_if(path, args)
-    result = replay(path, tolerance=args.tolerance, law=args.law)
+    result = replay(path, tolerance=args.tolerance, law=args.law, ticks_only=args.ticks)
     for line in lines(result):
         (tell if args.json else print)(printable(line))
     if args.json:
@@ -58,8 +62,9 @@ def lines(result: ReplayResult) -> Iterator[str]:
     if result.world is not None:
         yield f"world: {result.world.identical} of {result.world.states} states identical"
         differences.append(("world state ", result.world.first_difference))
-    yield f"derived: {result.derived.identical} of {result.derived.messages} messages identical"
-    differences.append(("message at ", result.derived.first_difference))
+    if result.derived is not None:
+        yield f"derived: {result.derived.identical} of {result.derived.messages} messages identical"
+        differences.append(("message at ", result.derived.first_difference))
     if result.arrived is not None:
         yield f"arrived: {result.arrived.identical} of {result.arrived.messages} messages as the ticks hold them"
         differences.append(("message at ", result.arrived.first_difference))
@@ -95,18 +100,8 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
             "identical": world.identical,
             "first_difference": _plain(world.first_difference),
         },
-        "derived": {
-            "messages": result.derived.messages,
-            "identical": result.derived.identical,
-            "first_difference": _plain(result.derived.first_difference),
-        },
-        "arrived": None
-        if result.arrived is None
-        else {
-            "messages": result.arrived.messages,
-            "identical": result.arrived.identical,
-            "first_difference": _plain(result.arrived.first_difference),
-        },
+        "derived": _messages(result.derived),
+        "arrived": _messages(result.arrived),
         "complete": result.complete,
         "made_by": {
             "format": result.made_by.format,
@@ -117,6 +112,13 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
         "notes": list(result.notes),
         "machine_differences": machine_differences(result.facts),
     }
+
+
+def _messages(found: DerivedReplay | BaseInputsReplay | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    first = _plain(found.first_difference)
+    return {"messages": found.messages, "identical": found.identical, "first_difference": first}
 
 
 def machine_differences(facts: dict[str, str]) -> list[str]:

@@ -109,7 +109,8 @@ def push_once(
     """
     simulated = bool(devices_at(rig, "sim"))
     out = run_dir.create(out, rig.name)
-    early = ReportProcess(out / "run.mcap", out / "report.html") if simulated and not args.no_report else None
+    follow = simulated and not args.no_report and not rig.log.in_parts
+    early = ReportProcess(out / "run.mcap", out / "report.html") if follow else None
     try:
         summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
     except BaseException:

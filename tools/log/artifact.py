@@ -50,21 +50,26 @@ def pack(logs: list[Path], top: Path, out: Path, names: tuple[str, ...]) -> Pack
     for log, summary in summaries.items():
         scrub.add_rig(rig_of_log(_config(summary), _format(summary, log)).rig)
     left_out: list[str] = []
-    runs = [scrub.text(str(log.parent.relative_to(top))) for log in logs]
+    folders: dict[Path, list[Path]] = {}
+    for log in logs:
+        folders.setdefault(log.parent, []).append(log)
+    runs = [scrub.text(str(folder.relative_to(top))) for folder in folders]
     root = scrub.text(top.resolve().name)
     with zipfile.ZipFile(out, "x", zipfile.ZIP_DEFLATED) as packed:
-        for log, summary in summaries.items():
-            place = scrub.text((Path(top.resolve().name) / log.parent.relative_to(top)).as_posix())
-            for file in sorted(log.parent.iterdir()):
-                if file == log:
-                    _add(packed, f"{place}/{scrub.text(log.name)}", scrubbed_log(log, summary, scrub), stored=True)
+        for folder, files in folders.items():
+            place = scrub.text((Path(top.resolve().name) / folder.relative_to(top)).as_posix())
+            for file in sorted(folder.iterdir()):
+                if file in files:
+                    content = scrubbed_log(file, summaries[file], scrub)
+                    _add(packed, f"{place}/{scrub.text(file.name)}", content, stored=True)
                 elif file.suffix in TEXTS and file.name != LEFT_OUT:
                     text = scrub.text(file.read_text(encoding="utf-8", errors="replace"))
                     _add(packed, f"{place}/{scrub.text(file.name)}", text.encode())
                 elif file.is_file():
                     left_out.append(f"{place}/{file.name}")
         removed = {kind: count for kind, count in sorted(scrub.counts.items()) if count}
-        _add(packed, f"{root}/README.txt", _readme(runs, removed, left_out, summaries).encode())
+        of_runs = [[summaries[file] for file in files] for files in folders.values()]
+        _add(packed, f"{root}/README.txt", _readme(runs, removed, left_out, of_runs).encode())
     return Packed(runs, removed, left_out)
 
 
@@ -129,20 +134,20 @@ def _add(packed: zipfile.ZipFile, name: str, content: bytes, *, stored: bool = F
     packed.writestr(info, content)
 
 
-def _readme(runs: list[str], removed: dict[str, int], left_out: list[str], logs: dict[Path, LogSummary]) -> str:
+def _readme(runs: list[str], removed: dict[str, int], left_out: list[str], logs: list[list[LogSummary]]) -> str:
     return "\n".join(_readme_lines(runs, removed, left_out, logs)) + "\n"
 
 
 def _readme_lines(
-    runs: list[str], removed: dict[str, int], left_out: list[str], logs: dict[Path, LogSummary]
+    runs: list[str], removed: dict[str, int], left_out: list[str], logs: list[list[LogSummary]]
 ) -> Iterator[str]:
     yield "Runs of single-point-push, packed by `push log zip`."
     yield "`push replay RUN` re-runs the control of each on its logged inputs and compares every byte."
     yield ""
-    for run, summary in zip(runs, logs.values(), strict=True):
-        facts = summary.metadata.get(RUN_METADATA, {})
+    for run, parts in zip(runs, logs, strict=True):
+        facts = parts[0].metadata.get(RUN_METADATA, {})
         made = f"{facts.get('program', 'an unknown version')}, commit {facts.get('commit', 'unknown')}"
-        yield f"  {run}: {summary.messages} messages, {made}"
+        yield f"  {run}: {sum(part.messages for part in parts)} messages, {made}"
     yield ""
     yield "Removed from settings, facts and texts, and replaced by words that mean nothing:"
     yield from (f"  {kind}: {count} times" for kind, count in removed.items())

@@ -14,8 +14,8 @@ from robot_io.cdr.schema import shape_from_schema, type_from_schema
 from robot_io.cdr.shape import Blob, Many, Nested, Shape
 from robot_io.errors import LogDamaged, UsageError
 from robot_io.mcap.log_file import LIBRARY, MESSAGE_ENCODING, SCHEMA_ENCODING
-from robot_io.mcap.read import LogSummary
-from robot_io.mcap.walk import Topic, walk
+from robot_io.mcap.read import LogSummary, walk_all
+from robot_io.mcap.walk import Topic
 
 # Unit of each field, by message type; an empty field name applies to every field of the type.
 _UNITS: dict[str, dict[str, str]] = {
@@ -88,7 +88,7 @@ class Decoders:
         A payload that does not match its schema ends the decoding of that topic and type. Raises as `read_log`.
         """
         types: dict[int, _Type] = {}
-        for item in walk(path):
+        for item in walk_all(path):
             if isinstance(item, Topic):
                 types[item.channel.id] = _type_of(item)
             elif isinstance(item, Message):

@@ -9,33 +9,34 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from msgspec.structs import replace
+
+from robot_io.clock import NS_PER_S
 from robot_io.errors import LogDamaged
-from robot_io.geometry import yaw_from_quaternion
 from robot_io.log.chain import TickChain
 from robot_io.log.channels import BY_TOPIC, CHANNELS, Kind
-from robot_io.log.messages import BASE_CLOCK, BaseClock
-from robot_io.log.ros_messages import POSE_STAMPED
 from robot_io.log.seal import LogSeal, config_seal
 from robot_io.log.world_messages import STATE_CDR
 from robot_io.mcap.log_file import McapLog
-from robot_io.messages import Pose2D
 from robot_io.rig.config import rig_from_toml
-from robot_io.tick import TICK_CDR, ControlTick
+from robot_io.tick import TICK_CDR, ControlTick, shortened
 from tools.log.derivation import SLIDER_TOPIC, TICK_TOPIC, Derivation
-from tools.log.stamp_ages import Latency, StampAges
+from tools.log.heard import STAMPED, Heard
+from tools.log.thinned_topics import holds_world_state
 from tools.log.tick_topics import Message
 
 OFFSET_FACT = "wall_offset_ns"
-STAMPED = (Kind.BASE_POSE, Kind.SLIDER_POSE, Kind.BASE_ODOM)
-"""Records that have their sender's stamp."""
+STATE_EVERY_NS = 10 * NS_PER_S
+"""At least so often a tick holds the state before it, from which replay can start."""
 
 
 class RunLog:
-    """One part of a run's log.
+    """One file of a run's log.
 
     config_text: the resolved rig. wall_offset_ns: added to each record's time to get its log time; stored in
-    `metadata`. also: called with topic, log time and payload of each message that was written. Raises as `McapLog` and
-    `rig_from_toml`; OSError when writing to disk fails.
+    `metadata`. also: called with topic, log time and payload of each message that was written. heard: what was learned
+    in the files before. newest: the last tick in them. Raises as `McapLog` and `rig_from_toml`; OSError when writing to
+    disk fails.
     """
 
     def __init__(
@@ -46,17 +47,21 @@ class RunLog:
         metadata: dict[str, str],
         wall_offset_ns: int,
         also: Callable[[str, int, bytes], None] | None = None,
+        heard: Heard | None = None,
+        newest: ControlTick | None = None,
     ) -> None:
         self._also = also
-        self._derive = Derivation(rig_from_toml(config_text), wall_offset_ns)
+        rig = rig_from_toml(config_text)
+        self._derive = Derivation(rig, wall_offset_ns)
+        self._rig = rig
         self._offset_ns = wall_offset_ns
         self._log = McapLog(path, config_text=config_text, metadata={**metadata, OFFSET_FACT: str(wall_offset_ns)})
         self._config_seal = config_seal(config_text.encode())
         self._declared: set[str] = set()
         self._scene_written = False
-        self._object: tuple[bytes, bytes] | None = None
-        self._ages = {CHANNELS[kind].topic: StampAges() for kind in STAMPED}
-        self._clock: BaseClock | None = None
+        self._heard = heard or Heard()
+        self.newest = newest
+        self._state_kept_ns: int | None = None
         self._seal = LogSeal()
         self.chain = TickChain()
         self.undecodable = 0
@@ -68,20 +73,9 @@ class RunLog:
         return self._log.messages
 
     @property
-    def object_poses(self) -> tuple[Pose2D, Pose2D] | None:
-        """The first and the last pose of the object, WORLD frame; None if no valid one was written."""
-        if self._object is None:
-            return None
-        first, last = (_planar(payload) for payload in self._object)
-        return (first, last) if first and last else None
-
-    @property
-    def latencies(self) -> dict[str, Latency]:
-        """How old the messages of the base and the motion capture were when they arrived, by topic."""
-        clock = self._clock
-        ahead_s, within_s = (None, 0.0) if clock is None else (clock.ahead_s, clock.within_s)
-        found = {topic: ages.latency(ahead_s, within_s) for topic, ages in self._ages.items()}
-        return {topic: latency for topic, latency in found.items() if latency is not None}
+    def size_bytes(self) -> int:
+        """Number of bytes written to the file so far."""
+        return self._log.size_bytes
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
         """Write one ring record and the messages derived from it. Raises OSError when writing to disk fails."""
@@ -91,11 +85,13 @@ class RunLog:
             except LogDamaged:
                 tick = None
             self.tick(time_ns, payload, tick)
+        elif kind == Kind.WORLD_STATE and not holds_world_state(self._rig, time_ns):
+            return
         elif kind in CHANNELS:
             log_time_ns = time_ns + self._offset_ns
             self._write(Message(CHANNELS[kind].topic, log_time_ns, payload))
             if kind in STAMPED:
-                self._ages[CHANNELS[kind].topic].note(payload, log_time_ns)
+                self._heard.stamped(kind, payload, log_time_ns)
             elif kind == Kind.BASE_CLOCK:
                 self._note_clock(payload)
             if kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
@@ -105,6 +101,10 @@ class RunLog:
 
     def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
         """Chain and write one tick; `tick` is the decoded `payload` (None if it cannot be decoded)."""
+        if tick is not None:
+            written = self._with_state(tick)
+            payload = TICK_CDR.encode(written if written.output.finished else shortened(written))
+            self.newest, tick = tick, written
         self._write(Message(TICK_TOPIC, time_ns + self._offset_ns, self.chain.link(payload)))
         if tick is None:
             self.undecodable += 1
@@ -116,6 +116,10 @@ class RunLog:
         """Flush everything to the operating system."""
         self._log.flush()
 
+    def fileno(self) -> int:
+        """Return the descriptor of the file."""
+        return self._log.fileno()
+
     def finish(self, facts: dict[str, str]) -> None:
         """Close the log, adding the facts known only at its end; idempotent."""
         own = {
@@ -125,7 +129,7 @@ class RunLog:
             "last_tick_crc32": f"{self.chain.crc32:08x}",
             "undecodable": str(self.undecodable),
             "unknown_kinds": str(self.unknown_kinds),
-            **{f"latency {topic}": latency.in_words() for topic, latency in self.latencies.items()},
+            **{f"latency {topic}": latency.in_words() for topic, latency in self._heard.latencies.items()},
         }
         self._log.finish({**own, **facts})
 
@@ -144,15 +148,27 @@ class RunLog:
             self._log.channel(channel.topic, channel.cdr_type, latched=channel.latched)
             self._seal.declare(channel.topic, channel.cdr_type.name, channel.cdr_type.schema_text.encode())
         if message.topic == SLIDER_TOPIC:
-            self._object = (self._object[0] if self._object else message.payload, message.payload)
+            self._heard.object_at(message.payload)
         self._seal.note(message.topic, message.log_time_ns, message.payload)
         self._log.write(message.topic, message.log_time_ns, message.payload)
         if self._also is not None:
             self._also(message.topic, message.log_time_ns, message.payload)
 
+    def _with_state(self, tick: ControlTick) -> ControlTick:
+        """Return a tick with the state before it where this file holds none that is younger than 10 s."""
+        now_ns, kept_ns, last = tick.input.now_ns, self._state_kept_ns, self.newest
+        if not tick.before:
+            if kept_ns is not None and now_ns - kept_ns < STATE_EVERY_NS:
+                return tick
+            if last is None or tick.input.tick != last.input.tick + 1 + tick.input.host.skipped:
+                return tick  # the state before it is not that of the tick before
+            tick = replace(tick, before=(last.after,))
+        self._state_kept_ns = now_ns
+        return tick
+
     def _note_clock(self, payload: bytes) -> None:
         try:
-            self._clock = BASE_CLOCK.decode(payload)
+            self._heard.clock_of_base(payload)
         except LogDamaged:
             self.undecodable += 1
 
@@ -167,14 +183,3 @@ class RunLog:
             return
         for message in derived:
             self._write(message)
-
-
-def _planar(payload: bytes) -> Pose2D | None:
-    """Return a pose on the floor, None if the message cannot be decoded or lies on its side."""
-    try:
-        pose = POSE_STAMPED.decode(payload).pose
-    except LogDamaged:
-        return None
-    turned = pose.orientation
-    yaw = yaw_from_quaternion(turned.x, turned.y, turned.z, turned.w)
-    return None if yaw is None else Pose2D(pose.position.x, pose.position.y, yaw)

@@ -42,6 +42,7 @@ from robot_io.tick import ControlTick, FtReading, Mode
 from safety.faults import FAULTS
 from tools.kinds import device_names
 from tools.log.signals import SignalsOf
+from tools.log.thinned_topics import TickThinning
 from tools.log.torque import TorqueOf
 
 JOINT_NAMES = (
@@ -81,6 +82,7 @@ class TickTopics:
         self._sensor_in_base = rig.frames.sensor_in_base_m
         self._until_3 = log_format <= 3
         self._torque, self._signals = TorqueOf(rig), SignalsOf(rig)
+        self._thinned = TickThinning(rig, log_format)
         self._faults: tuple[str, ...] = ()
         self._mode = 0
         self._paused = False
@@ -95,16 +97,15 @@ class TickTopics:
         header = Header(ros_time(now_ns), WORLD_FRAME)
         body = Header(header.stamp, BASE_FRAME)
         messages = [raw for reading in inp.ft.readings for raw in self._raw_wrench(reading)]
-        messages += self._wrench(tick, now_ns)
-        messages += self._twist("/base/cmd_vel_raw", body, now_ns, out.wanted_body)
-        messages += self._twist("/base/cmd_vel", body, now_ns, out.command_body)
+        torque = self._torque.of(tick)
+        if self._thinned.viewers(now_ns):
+            messages += self._wrench(tick, torque, now_ns)
+            messages += self._twist("/base/cmd_vel_raw", body, now_ns, out.wanted_body)
+            messages += self._twist("/base/cmd_vel", body, now_ns, out.command_body)
         if not self._until_3:
             messages.append(message("/control/signals", now_ns, self._signals.of(tick, header)))
-        host = inp.host
-        timing = LoopTiming(
-            header, inp.tick, inp.now_ns - host.late_ns, host.late_ns, host.skipped, host.skipped > 0, host.log_dropped
-        )
-        messages.append(message("/loop/timing", now_ns, timing))
+        if self._thinned.timing(now_ns, inp.host.skipped):
+            messages.append(message("/loop/timing", now_ns, _timing(tick, header)))
         messages += self._arm(tick)
         messages += self._base(tick)
         messages += self._events(tick, header, now_ns)
@@ -120,8 +121,8 @@ class TickTopics:
         wrench = Wrench(Vector3(*reading.force), Vector3(*reading.torque))
         return [message("/ft/wrench_raw", time_ns, WrenchStamped(Header(ros_time(time_ns), SENSOR_FRAME), wrench))]
 
-    def _wrench(self, tick: ControlTick, now_ns: int) -> list[Message]:
-        force, torque = tick.after.control.force_world, self._torque.of(tick)
+    def _wrench(self, tick: ControlTick, torque: tuple[float, float, float], now_ns: int) -> list[Message]:
+        force = tick.after.control.force_world
         frame = WORLD_FRAME if self._until_3 else SENSOR_WORLD_FRAME
         if not self._sound(*force, *torque):
             return []
@@ -148,7 +149,7 @@ class TickTopics:
         if self._sound(*joints.position, *joints.velocity):
             state = JointState(header, JOINT_NAMES, joints.position, joints.velocity, ())
             messages.append(message("/arm/joint_states", time_ns, state))
-        if not self._until_3:
+        if not self._until_3 and self._thinned.arm_status(time_ns, arm):
             status = ArmStatus(
                 header, joints.controller_time_s, joints.device_state, joints.state, arm.link, arm.error, arm.servo
             )
@@ -161,7 +162,7 @@ class TickTopics:
             return []
         self._pose_seq = base.pose_seq
         time_ns = base.pose_received_ns + self._offset_ns
-        if not self._sound(base.pose.x, base.pose.y, base.pose.yaw):
+        if not self._sound(base.pose.x, base.pose.y, base.pose.yaw) or not self._thinned.frames(time_ns):
             return []
         header = Header(ros_time(time_ns), WORLD_FRAME)
         pose = Transform(Vector3(base.pose.x, base.pose.y, 0.0), yaw_quaternion(base.pose.yaw))
@@ -200,6 +201,13 @@ class TickTopics:
             line = f"{fault} {text}".strip()
             messages.append(message("/rosout", now_ns, Log(header.stamp, level, "safety", line, "", "", 0)))
         return messages
+
+
+def _timing(tick: ControlTick, header: Header) -> LoopTiming:
+    number, now_ns, host = tick.input.tick, tick.input.now_ns, tick.input.host
+    return LoopTiming(
+        header, number, now_ns - host.late_ns, host.late_ns, host.skipped, host.skipped > 0, host.log_dropped
+    )
 
 
 def _mode(number: int) -> str:

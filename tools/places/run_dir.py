@@ -8,11 +8,13 @@ import time
 from pathlib import Path
 
 from robot_io.errors import UsageError
+from robot_io.mcap.files import files_of, has_parts
 from robot_io.rig.config import RigConfig, rig_to_toml
 from tools.places.atomic_file import check_writable
 
 MAX_RUNS_PER_SECOND = 1000
-RUN_FILES = ("run.mcap", "config.toml", "summary.json", "processes.json", "report.html")
+LOG = "run.mcap"
+RUN_FILES = (LOG, "config.toml", "summary.json", "processes.json", "report.html")
 
 
 def create(out: Path | None, rig_name: str) -> Path:
@@ -22,7 +24,7 @@ def create(out: Path | None, rig_name: str) -> Path:
     """
     path = out or Path("runs") / f"{rig_name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
-        if any((path / name).exists() for name in RUN_FILES) and out:
+        if out and (any((path / name).exists() for name in RUN_FILES) or has_parts(path / LOG)):
             raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
         path = _make_folder(path, given=bool(out))
         check_writable(path)
@@ -48,8 +50,8 @@ def _make_folder(path: Path, *, given: bool) -> Path:
 
 def discard(path: Path) -> None:
     """Remove the files of a run that did not start, and the folder if nothing else is in it."""
-    for name in RUN_FILES:
-        (path / name).unlink(missing_ok=True)
+    for file in (*files_of(path / LOG), *(path / name for name in RUN_FILES)):
+        file.unlink(missing_ok=True)
     with contextlib.suppress(OSError):
         path.rmdir()
 

@@ -55,13 +55,21 @@ class BaseInputsReplayer:
     """Compares the ticks of a log with its messages of `TOPICS`; a tick and its messages must be near each other."""
 
     def __init__(
-        self, wall_offset_ns: int, channels: Iterable[ChannelInfo], log_format: int, tolerance: float | None
+        self,
+        wall_offset_ns: int,
+        channels: Iterable[ChannelInfo],
+        log_format: int,
+        tolerance: float | None,
+        *,
+        since_ns: int = 0,
     ) -> None:
+        """since_ns: when the log began, where it is a later part: what came until then is not in it."""
         other = {channel.topic for channel in channels if not is_current_type(channel)}
         other |= {topic for topic, first_format in _FROM_FORMAT.items() if log_format < first_format}
         self._topics = {topic: _Topic() for topic in TOPICS if topic not in other}
         self._tolerance = tolerance
         self._offset_ns = wall_offset_ns
+        self._since_ns = since_ns
         self._gate = GateLog(self._expect, wall_offset_ns)
         self._held = (0, 0, 0, 0)
         self._identical = 0
@@ -125,7 +133,7 @@ class BaseInputsReplayer:
     def _expect(self, kind: int, time_ns: int, payload: bytes) -> None:
         topic, log_time_ns = CHANNELS[kind].topic, time_ns + self._offset_ns
         state = self._topics.get(topic)
-        if state is None:
+        if state is None or time_ns <= self._since_ns:
             return
         if any(self._equal(topic, logged, payload) for logged in state.seen.get(log_time_ns, ())):
             self._identical += 1

@@ -3,179 +3,138 @@
 The first tick's state is the initial state. Today's code processes each tick's input with the log's own config; the
 result is encoded and compared with the log (for a log of an earlier format, only the fields that both have). The
 simulated world of an emulated or simulated run is also rebuilt, given the commands it received then, and compared in
-the same way; finally the topics the recorder derived are derived again and compared.
+the same way; finally the topics the recorder derived are derived again and compared. Of a log in parts, ticks and world
+go on from part to part; each part derived its topics anew.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
-
-from robot_io.log.logged_type import LoggedType
 from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
-from robot_io.tick import TICK_CDR, ControlTick, TickState
+from robot_io.mcap.files import files_of
+from robot_io.rig.config import RigConfig
 from tools.log.derivation import WORLD_TOPIC
-from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplay, BaseInputsReplayer
-from tools.replay.code_origin import CodeOrigin
+from tools.log.run_parts import SINCE_FACT
+from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplayer
 from tools.replay.derived import DerivedReplay, DerivedReplayer
-from tools.replay.difference import Difference, difference
 from tools.replay.law import law_of, with_law_source
-from tools.replay.verified_log import VerifiedLog
-from tools.replay.world import PREFIX, WorldReplay, WorldReplayer, WorldTypes
-from tools.run.facts.run_facts import level_of
+from tools.replay.result import ReplayResult, all_derived, notes_of
+from tools.replay.ticks import TickReplayer
+from tools.replay.verified_log import VerifiedLog, in_order
+from tools.replay.world import PREFIX, WorldReplayer, WorldTypes
 from tools.run.tick_core import TickCore
 
 
-class ReplayResult(msgspec.Struct, frozen=True):
-    """How a log compared, tick by tick. `notes` name what could not be compared."""
+def replay(path: Path, *, tolerance: float | None = None, law: str = "", ticks_only: bool = False) -> ReplayResult:
+    """Replay a log, in one file or in parts. law: `module:Class` of its law where that is not a shipped one.
 
-    ticks: int
-    identical: int
-    gaps: int
-    first_difference: Difference | None
-    world: WorldReplay | None
-    derived: DerivedReplay
-    arrived: BaseInputsReplay | None
-    """None if it cannot be compared: the log is of an earlier format, or records did not fit into the gate's ring."""
-    complete: bool
-    notes: tuple[str, ...]
-    made_by: CodeOrigin
-    facts: dict[str, str]
-
-    @property
-    def different(self) -> bool:
-        """Return whether any result differs from the log."""
-        parts = (self.world, self.derived, self.arrived)
-        return self.first_difference is not None or any(part and part.first_difference for part in parts)
-
-
-def replay(path: Path, *, tolerance: float | None = None, law: str = "") -> ReplayResult:
-    """Replay a log. law: `module:Class` of its law where that is not a shipped one.
-
-    Raises UsageError if there is no such log, LogDamaged if it cannot be trusted, ReplayDiffers if only the code that
-    wrote it can use its config, and as `law_of`.
+    ticks_only: neither the world, nor derived topics, nor what arrived. Raises UsageError if there is no such log,
+    LogDamaged if it cannot be trusted, ReplayDiffers if only the code that wrote it can use its config, and as
+    `law_of`.
     """
-    log = VerifiedLog(path)
-    rig = log.usable_rig()
-    own, sha256 = law_of(path, rig.control, law)
-    made_by = with_law_source(log.made_by, log.facts, sha256)
-    ticks = TickReplayer(TickCore.of(rig, in_contact=log.in_contact, law=own), tolerance, log.ticks)
-    types = WorldTypes(
-        log.type_of("/world/start", START_CDR),
-        log.type_of("/world/command", COMMAND_CDR),
-        log.type_of(WORLD_TOPIC, STATE_CDR),
-    )
-    # A world with incomplete records cannot be re-run.
-    world = None if log.dropped("world") else WorldReplayer(rig, types, tolerance)
-    derived = DerivedReplayer(rig, log.wall_offset_ns, log.channels, log.made_by.format, tolerance)
-    known = log.made_by.format >= FIRST_FORMAT and log.ticks.holds_all_of("input.base")
-    comparable = known and not log.dropped("gate")
-    arrived = (
-        BaseInputsReplayer(log.wall_offset_ns, log.channels, log.made_by.format, tolerance) if comparable else None
-    )
-    for topic, log_time_ns, payload, tick in log.messages():
-        if tick is not None:
-            ticks.take(tick, payload)
-            derived.tick(tick, log_time_ns)
-            if arrived is not None:
-                arrived.tick(tick)
-            continue
-        if topic.startswith(PREFIX) and world is not None:
-            world.take(topic, payload)
-        if topic == WORLD_TOPIC:
-            derived.world(types.state.decode(payload), log_time_ns)
-        derived.seen(topic, log_time_ns, payload)
-        if arrived is not None:
-            arrived.seen(topic, log_time_ns, payload)
-    world_replay = None if world is None else world.result()
-    derived_replay = derived.result(complete=log.complete)
-    result = ReplayResult(
-        ticks.count,
-        ticks.identical,
-        ticks.gaps,
-        ticks.first,
-        world_replay,
-        derived_replay,
-        None if arrived is None else arrived.result(complete=log.complete),
-        log.complete,
-        (
-            *_notes(log, ticks.last),
-            *_world_notes(world, world_replay, types, level_of(rig)),
-            *_derived_notes(derived_replay),
-        ),
-        made_by,
-        log.facts,
-    )
+    return replay_files(files_of(path), tolerance=tolerance, law=law, ticks_only=ticks_only)
+
+
+def replay_files(
+    files: Sequence[Path], *, tolerance: float | None = None, law: str = "", ticks_only: bool = False
+) -> ReplayResult:
+    """Replay files that follow each other; the first need not be that of the run. As `replay`."""
+    logs = [VerifiedLog(file) for file in files]
+    in_order(logs)
+    session = _Session(logs[0], tolerance, law, ticks_only=ticks_only)
+    for log in logs:
+        session.take(log)
+    result = session.result(logs)
     if not result.different:  # a difference tells more than a changed config
-        log.require_config()
+        for log in logs:
+            log.require_config()
     return result
 
 
-def _notes(log: VerifiedLog, last: int) -> list[str]:
-    notes = [*log.notes, *log.ticks.notes("/control/tick")]
-    if not log.complete:
-        notes.append(f"the log was recovered: it ends with tick {last}; everything after that is lost")
-    if not log.config_intact:
-        notes.append("the log's config.toml was changed after it was finished")
-    return notes
+class _Session:
+    """What goes on from part to part of one log."""
 
-
-def _world_notes(world: WorldReplayer | None, replayed: WorldReplay | None, types: WorldTypes, level: str) -> list[str]:
-    if replayed is None and level != "hardware":
-        why = "records of it did not fit into the log's ring" if world is None else "its start is missing"
-        return [f"the world was not compared: {why}"]
-    return types.state.notes(WORLD_TOPIC)
-
-
-def _derived_notes(derived: DerivedReplay) -> list[str]:
-    if not derived.not_compared:
-        return []
-    return [f"not compared, because they are derived differently today: {', '.join(derived.not_compared)}"]
-
-
-class TickReplayer:
-    """Re-runs ticks given in order and compares each; after a gap the state comes from the log."""
-
-    def __init__(self, core: TickCore, tolerance: float | None, logged: LoggedType[ControlTick]) -> None:
-        self._core = core
-        self._logged = logged
+    def __init__(self, log: VerifiedLog, tolerance: float | None, law: str, *, ticks_only: bool) -> None:
+        self._rig: RigConfig = log.usable_rig()
         self._tolerance = tolerance
-        self._state: TickState | None = None
-        self.count = self.identical = self.gaps = 0
-        self.last = -1
-        self.first: Difference | None = None
+        self._ticks_only = ticks_only
+        own, sha256 = law_of(log.path, self._rig.control, law)
+        self._made_by = with_law_source(log.made_by, log.facts, sha256)
+        core = TickCore.of(self._rig, in_contact=log.in_contact, law=own)
+        self._ticks = TickReplayer(core, tolerance, log.ticks)
+        self._types = WorldTypes(
+            log.type_of("/world/start", START_CDR),
+            log.type_of("/world/command", COMMAND_CDR),
+            log.type_of(WORLD_TOPIC, STATE_CDR),
+        )
+        # A world with incomplete records cannot be re-run.
+        can_run = not ticks_only and not log.dropped("world")
+        self._world = WorldReplayer(self._rig, self._types, tolerance) if can_run else None
+        known = log.made_by.format >= FIRST_FORMAT and log.ticks.holds_all_of("input.base")
+        self._arrived = (
+            BaseInputsReplayer(log.wall_offset_ns, log.channels, log.made_by.format, tolerance, since_ns=_since(log))
+            if known and not ticks_only and not log.dropped("gate")
+            else None
+        )
+        self._derived: list[DerivedReplay] = []
 
-    def take(self, tick: ControlTick, payload: bytes) -> None:
-        """Re-run and compare one tick."""
-        number = tick.input.tick
-        if self._state is None or number != self.last + 1 + tick.input.host.skipped:
-            self.gaps += self._state is not None
-            self._state = tick.before[0] if tick.before else None
-        found: Difference | None = Difference(number, "before", "no state", "a state to start from")
-        after = tick.after
-        if self._state is not None:
-            found, after = self._compare(tick, payload, self._state)
-        self.count += 1
-        self.identical += found is None
-        self.first = self.first or found
-        # With a tolerance the log's own state is used, so that rounding errors do not accumulate.
-        self._state = after if self._tolerance is None else tick.after
-        self.last = number
+    def take(self, log: VerifiedLog) -> None:
+        """Re-run and compare one file. Raises LogDamaged."""
+        if self._ticks_only:
+            for _, _, payload, tick in log.messages():
+                if tick is not None:
+                    self._ticks.take(tick, payload)
+            return
+        derived = DerivedReplayer(self._rig, log.wall_offset_ns, log.channels, log.made_by.format, self._tolerance)
+        ticks, world, arrived, state = self._ticks, self._world, self._arrived, self._types.state
+        for topic, log_time_ns, payload, tick in log.messages():
+            if tick is not None:
+                ticks.take(tick, payload)
+                derived.tick(tick, log_time_ns)
+                if arrived is not None:
+                    arrived.tick(tick)
+                continue
+            if topic.startswith(PREFIX) and world is not None:
+                world.take(topic, payload)
+            if topic == WORLD_TOPIC:
+                derived.world(state.decode(payload), log_time_ns)
+            derived.seen(topic, log_time_ns, payload)
+            if arrived is not None:
+                arrived.seen(topic, log_time_ns, payload)
+        self._derived.append(derived.result(complete=log.complete))
 
-    def _compare(self, tick: ControlTick, payload: bytes, before: TickState) -> tuple[Difference | None, TickState]:
-        number = tick.input.tick
-        try:
-            after, output = self._core.fold(before, tick.input)
-            kept = (before,) if tick.before else ()
-            replayed = ControlTick(tick.crc32_before, tick.reserved, tick.input, kept, after, output)
-            encoded = TICK_CDR.encode(replayed)
-            if self._logged.exact and encoded == payload:
-                return None, after
-            replayed = TICK_CDR.decode(encoded)  # as a log holds it: a whole number where a float belongs is one
-        except Exception as error:  # nothing in a log may crash its replay; the run itself survived this tick
-            return Difference(number, "output", "a tick", f"{type(error).__name__}: {error}"), tick.after
-        found = difference(number, tick, replayed, self._tolerance, self._logged.missing)
-        if found is None and self._tolerance is None and self._logged.exact:
-            found = Difference(number, "", "bytes", "other bytes")
-        return found, after
+    def result(self, logs: Sequence[VerifiedLog]) -> ReplayResult:
+        """Return how all files compared."""
+        ticks, last = self._ticks, logs[-1]
+        world = None if self._world is None else self._world.result()
+        derived = all_derived(self._derived) if self._derived else None
+        return ReplayResult(
+            ticks.count,
+            ticks.identical,
+            ticks.gaps,
+            ticks.first,
+            world,
+            derived,
+            None if self._arrived is None else self._arrived.result(complete=last.complete),
+            all(log.complete for log in logs),
+            notes_of(
+                logs,
+                ticks.last,
+                self._rig,
+                derived,
+                world,
+                self._types,
+                has_world=self._world is not None,
+                ticks_only=self._ticks_only,
+            ),
+            self._made_by,
+            logs[0].facts,
+        )
+
+
+def _since(log: VerifiedLog) -> int:
+    """Return when a part began, 0 for the first: what its ticks hold from before is in the part before."""
+    text = log.facts.get(SINCE_FACT, "0")
+    return int(text) if text.isdecimal() and len(text) < 20 else 0

@@ -1,8 +1,9 @@
-"""Read a log while verifying it: its chain of ticks, their times, and the seal at its end."""
+"""Read a log while verifying it: its chain of ticks, their times, the seal at its end, and the order of its parts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -22,10 +23,12 @@ from robot_io.rig.logged import rig_of_log
 from robot_io.tick import TICK_CDR, ControlTick
 from tools.log.derivation import TICK_TOPIC
 from tools.log.run_log import OFFSET_FACT
+from tools.log.run_parts import BEFORE_FACT, PART_FACT
 from tools.replay.code_origin import CodeOrigin, compare_code
 from tools.run.facts.code_facts import code_facts
 
 MessageT = TypeVar("MessageT", bound=msgspec.Struct)
+LAST_TICK_FACT = "last_tick_crc32"
 DO_DAMAGED = "Do not trust this log from there on; `push log info` shows what it contains"
 
 
@@ -80,7 +83,8 @@ class VerifiedLog:
         )
 
     @property
-    def _end_facts(self) -> dict[str, str]:
+    def end_facts(self) -> dict[str, str]:
+        """What was known at the end of the log, or when it was recovered."""
         return self._end if self._end is not None else self._saved or {}
 
     @property
@@ -112,7 +116,7 @@ class VerifiedLog:
 
     def messages(self) -> Iterator[Item]:
         """Yield every message in file order. Read all before trusting any: the end may raise LogDamaged."""
-        chain, seal = TickChain(), seal_of(self._end_facts, self.made_by.format)
+        chain, seal = TickChain(), seal_of(self.end_facts, self.made_by.format)
         for channel in self.channels:
             seal.declare(channel.topic, channel.schema_name, channel.schema_text.encode())
         last = -1
@@ -126,11 +130,10 @@ class VerifiedLog:
         self._check_end(chain, seal, last)
 
     def _is_config_intact(self, summary: LogSummary) -> bool:
-        if self._end_facts and self.made_by.format == 1 and CONFIG_FACT not in self._end_facts:
+        if self.end_facts and self.made_by.format == 1 and CONFIG_FACT not in self.end_facts:
             return True  # format 1 did not seal it, as the notes say
         return (
-            self._end_facts.get(CONFIG_FACT)
-            == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
+            self.end_facts.get(CONFIG_FACT) == config_seal(summary.attachments.get(CONFIG_ATTACHMENT, b""))[CONFIG_FACT]
         )
 
     def _read_rig(self, summary: LogSummary) -> RigConfig | str:
@@ -147,9 +150,9 @@ class VerifiedLog:
 
     def _seal_notes(self) -> list[str]:
         """Return what the seal of a log of the first format does not cover."""
-        if self.made_by.format > 1 or "message_sum" in self._end_facts:
+        if self.made_by.format > 1 or "message_sum" in self.end_facts:
             return []
-        what = "types and times of messages" if "payload_sum" in self._end_facts else "messages but ticks"
+        what = "types and times of messages" if "payload_sum" in self.end_facts else "messages but ticks"
         return [f"the log's seal does not cover its config.toml, nor {what}"]
 
     def _tick(self, message: LogMessage, last: int, chained: bool) -> ControlTick:
@@ -172,9 +175,9 @@ class VerifiedLog:
             raise LogDamaged(
                 "the log contains no ticks", where=str(self.path), do="The run ended before its loop started"
             )
-        wanted = self._end_facts
+        wanted = self.end_facts
         if self._end is not None:
-            ticks = {"ticks": str(chain.ticks), "last_tick_crc32": f"{chain.crc32:08x}"}
+            ticks = {"ticks": str(chain.ticks), LAST_TICK_FACT: f"{chain.crc32:08x}"}
             if any(wanted.get(name) != value for name, value in ticks.items()):
                 raise self._damaged(f"tick {last}, the last one, was altered or ticks are missing")
         if any(wanted.get(name) != value for name, value in seal.facts().items()):
@@ -190,3 +193,16 @@ class VerifiedLog:
 
     def _damaged(self, what: str) -> LogDamaged:
         return LogDamaged(what, where=str(self.path), do=DO_DAMAGED)
+
+
+def in_order(logs: Sequence[VerifiedLog]) -> None:
+    """Raise LogDamaged unless each part names the last tick of the one before it."""
+    for before, part in pairwise(logs):
+        numbers = before.facts.get(PART_FACT, "?"), part.facts.get(PART_FACT, "?")
+        follows = numbers[0].isdecimal() and numbers[1] == str(int(numbers[0]) + 1)
+        # A part that was recovered has lost its end, and does not know which tick was the last.
+        if follows and before.complete:
+            follows = part.facts.get(BEFORE_FACT) == before.end_facts.get(LAST_TICK_FACT)
+        if not follows:
+            what = f"it does not go on where {before.path.name} ends"
+            raise LogDamaged(what, where=str(part.path), do="Replay each part by itself")

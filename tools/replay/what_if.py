@@ -13,11 +13,12 @@ from pathlib import Path
 import msgspec
 
 from robot_io.errors import ConfigError
+from robot_io.mcap.files import files_of
 from robot_io.rig.config import RigConfig
 from robot_io.tick import ControlTick, Phase
 from safety import limits
 from tools.replay.law import core_maker
-from tools.replay.verified_log import VerifiedLog
+from tools.replay.verified_log import VerifiedLog, in_order
 from tools.replay.what_if_keys import other_rig
 from tools.replay.what_if_sides import PARTS, Change, End, OtherFault, Part, PartResult, Side, parts_of
 from tools.run.tick_core import TickCore
@@ -149,15 +150,19 @@ def what_if(path: Path, settings: Sequence[str], *, law: str = "") -> WhatIfResu
     Raises UsageError for keys that cannot change a replay, ConfigError for values that no rig can have, and as
     `VerifiedLog` for the log. law: `module:Class` of its law where that is not a shipped one; raises as `law_of`.
     """
-    log = VerifiedLog(path)
-    log.require_config()
+    logs = [VerifiedLog(file) for file in files_of(path)]
+    in_order(logs)
+    for log in logs:
+        log.require_config()
+    log = logs[0]
     rig = log.usable_rig()
     core_of = core_maker(path, rig.control, law, in_contact=log.in_contact)
     other = other_rig(rig, settings, core_of)
     found = WhatIf(core_of(rig), core_of(other))
-    for _, _, _, tick in log.messages():
-        if tick is not None:
-            found.take(tick)
+    for part in logs:
+        for _, _, _, tick in part.messages():
+            if tick is not None:
+                found.take(tick)
     return found.result(settings, _refusals(other))
 
 

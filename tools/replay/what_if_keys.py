@@ -16,6 +16,7 @@ _DEVICES = "the log holds what the devices of then sent"
 FIXED = {
     "world": "the simulated world is not run again; the log holds what it did",
     "faults": "the faults that were injected are in the log's measurements",
+    "log": "what was recorded is in the log",
     "loop": "the ticks of a log keep the rate at which they ran",
     "ft.kind": _DEVICES,
     "ft.level": _DEVICES,

@@ -12,6 +12,7 @@ from robot_io.log.world_messages import STATE_CDR, WorldCommand, WorldStart, Wor
 from robot_io.rig.config import RigConfig
 from sim_backend.world.base_plant import GRID_NS
 from sim_backend.world.world import STATE_EVERY_STEPS, World, WorldRecord
+from tools.log.thinned_topics import holds_world_state
 from tools.replay.difference import Difference, difference
 
 PREFIX = "/world/"
@@ -63,7 +64,7 @@ class WorldReplayer:
         return None if self._world is None else WorldReplay(self._states, self._identical, self._first)
 
     def _keep(self, record: WorldRecord) -> None:
-        if isinstance(record, WorldState):
+        if isinstance(record, WorldState) and holds_world_state(self._rig, record.t_ns):
             self._replayed.append(record)
 
     def _command(self, world: World, payload: bytes) -> None:
@@ -77,7 +78,7 @@ class WorldReplayer:
             self._first = self._first or Difference(command.arrival_ns, "arrival_ns", command.arrival_ns, str(error))
 
     def _compare(self, world: World, payload: bytes) -> None:
-        if not self._replayed:  # by the world's own clock: a time from the log could demand an endless run
+        while not self._replayed:  # by the world's own clock: a time from the log could demand an endless run
             world.advance_to(world.now_ns + STATE_EVERY_STEPS * GRID_NS)
         replayed = self._replayed.popleft()
         self._states += 1

@@ -16,6 +16,7 @@ from string import Template
 from typing import Any
 
 from robot_io.errors import EnvironmentFault, PushError, UsageError
+from robot_io.mcap.files import has_parts
 from robot_io.mcap.walk import Grown
 from safety.faults import FAULTS
 from tools.laws import law_label
@@ -210,7 +211,8 @@ def main(argv: Sequence[str]) -> int:
     warm_up()
     log = Path(argv[0])
     try:
-        write_report(log, Path(argv[1]), grown=GrowingLog(log, sys.stdin.fileno()).wait_for_size)
+        grown = None if has_parts(log) else GrowingLog(log, sys.stdin.fileno()).wait_for_size
+        write_report(log, Path(argv[1]), grown=grown)
     except PushError as error:
         print(error, file=sys.stderr)
         return error.exit_code

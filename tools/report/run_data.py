@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
 from robot_io.log.messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
 from robot_io.log.ros_messages import POSE_STAMPED
+from robot_io.log.signals import SIGNALS
 from robot_io.log.world_messages import STATE_CDR
+from robot_io.mcap.files import files_of
 from robot_io.mcap.log_file import RUN_METADATA
 from robot_io.mcap.walk import Grown, Topic, walk
 from robot_io.rig.config import RigConfig
@@ -49,6 +52,7 @@ TICK_COLUMNS = (
 SLIDER_COLUMNS = ("t_s", "x_m", "y_m", "yaw_rad")
 READ: dict[str, CdrType[Any]] = {
     "/control/tick": TICK_CDR,
+    "/control/signals": SIGNALS,
     "/loop/timing": LOOP_TIMING,
     "/safety/event": SAFETY_EVENT,
     "/world/state": STATE_CDR,
@@ -98,7 +102,8 @@ def read_run(path: Path, *, grown: Grown | None = None) -> RunData:
     """
     reader = _Reader(path)
     topics: dict[int, str] = {}
-    for item in walk(path, grown=grown):
+    files = files_of(path)
+    for item in walk(path, grown=grown) if grown is not None else chain.from_iterable(map(walk, files)):
         if isinstance(item, Message):
             reader.message(topics[item.channel_id], item.log_time, item.data)
         elif isinstance(item, Topic):
@@ -126,6 +131,7 @@ class _Reader:
         self._world_end_s: float | None = None
         self._seen = Series(SLIDER_COLUMNS)
         self._late = Tally()
+        self._late_in_signals = False
         self._skipped = 0
         self._skips: list[tuple[float, int]] = []
         self._ages = {"ft": Tally(), "arm": Tally(), "base": Tally()}
@@ -150,6 +156,7 @@ class _Reader:
             return
         text = schema.decode(errors="replace")
         log_format = self._format()
+        self._late_in_signals = log_format >= 5  # the topic of the timing holds one tick a second since then
         try:
             self._types[topic] = LoggedType(READ[topic], schema_name, text, log_format)
         except LogDamaged as error:
@@ -166,10 +173,13 @@ class _Reader:
             self._tick(time_s, payload)
         elif topic == "/loop/timing":
             timing = self._types[topic].decode(payload)
-            self._late.add(timing.late_ns * 1e-6)
+            if not self._late_in_signals:
+                self._late.add(timing.late_ns * 1e-6)
             self._skipped += timing.skipped
             if timing.skipped and len(self._skips) < MOST_SKIPS:
                 self._skips.append((time_s, timing.skipped))
+        elif topic == "/control/signals" and self._late_in_signals:
+            self._late.add(self._types[topic].decode(payload).wake_late_us * 1e-3)
         elif topic == "/safety/event":
             self._event(time_s, self._types[topic].decode(payload))
         elif topic == "/world/state":

@@ -37,7 +37,7 @@ from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
 from tools.kinds import name_of
 from tools.live.feed import LiveFeed
-from tools.log.run_log import RunLog
+from tools.log.run_parts import RunParts
 from tools.log.world_log import ring_listener
 from tools.places.saved_tare import SavedTare
 from tools.run.facts.run_facts import run_facts
@@ -50,7 +50,7 @@ MAX_SIMULATED_S = 4 * 3600.0
 
 
 class LockstepLog(Protocol):
-    """Receives the records of a lockstep run: a `RunLog`, or a sweep's log that keeps nothing."""
+    """Receives the records of a lockstep run: a `RunParts`, or a sweep's log that keeps nothing."""
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
         """Receive one ring record."""
@@ -213,11 +213,11 @@ def open_log(
     in_contact: bool,
     note: str = "",
     to_view: socket.socket | None = None,
-) -> RunLog:
+) -> RunParts:
     """Open the log of a lockstep run; its facts hold nothing that differs from run to run. to_view: a live view's."""
     facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact, note=note)
     also = LiveFeed(to_view).add if to_view is not None else None
-    return RunLog(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_WALL_OFFSET_NS, also=also)
+    return RunParts(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_WALL_OFFSET_NS, also=also)
 
 
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:

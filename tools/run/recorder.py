@@ -10,7 +10,8 @@ EOF means it has ended. The first is control's: its EOF ends the run. The others
 `live_fd` leads to the live view, -1 where there is none; nothing waits for it.
 
 There is no other way to stop it: SIGINT, SIGTERM and SIGHUP are ignored, because a signal to the process group
-would truncate the log. On `status_fd` it reports "ready", "error" and "finished" (`robot_io.ipc.status`).
+would truncate the log. What is written is handed to the system four times a second and brought to the disk every
+second. On `status_fd` it reports "ready", "error" and "finished" (`robot_io.ipc.status`).
 If the disk fails, it reports the error, keeps draining so that no producer blocks, and counts the lost records; exit
 code 1.
 """
@@ -21,6 +22,7 @@ import os
 import signal
 import socket
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -32,10 +34,12 @@ from robot_io.ipc.event_loop import HANGUP, READ, EventLoop
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from tools.live.feed import LiveFeed
-from tools.log.run_log import RunLog
+from tools.log.run_parts import RunParts
 
 POLL_NS = 20 * NS_PER_MS
 FLUSH_NS = 250 * NS_PER_MS
+SYNC_NS = 1000 * NS_PER_MS
+"""How often the file is brought to the disk. A disk that takes longer than that holds the push (F63)."""
 OTHERS_MAX_NS = 1500 * NS_PER_MS
 FINAL_DRAIN_MAX_NS = 5000 * NS_PER_MS
 """Limit for a producer that is still running and pushes faster than the disk can write."""
@@ -76,7 +80,8 @@ class Recorder:
         self._control_gone_ns: int | None = None
         self._loop = EventLoop()
         self._live = LiveFeed(socket.socket(fileno=job.live_fd)) if job.live_fd >= 0 else None
-        self._log = RunLog(
+        self._caught_up = True
+        self._log = RunParts(
             Path(job.out_path),
             config_text=job.config_text,
             metadata=job.metadata,
@@ -89,7 +94,8 @@ class Recorder:
         for fd in self._job.alive_fds:
             self._loop.add_fd(fd, partial(self._on_alive, fd), READ | HANGUP)
         self._loop.call_every(POLL_NS, self._on_poll)
-        self._loop.call_every(FLUSH_NS, lambda _: self._flush())
+        self._loop.call_every(FLUSH_NS, lambda _: self._to_disk(self._log.flush))
+        self._loop.call_every(SYNC_NS, lambda _: self._to_disk(lambda: os.fdatasync(self._log.fileno())))
         self._status.say("ready", path=self._job.out_path)
         self._loop.run()
         until_ns = monotonic_ns() + FINAL_DRAIN_MAX_NS
@@ -110,6 +116,8 @@ class Recorder:
 
     def _on_poll(self, _: int) -> None:
         self._drain()
+        if self._caught_up:  # no tick is written before a record that it holds
+            self._to_disk(lambda: self._log.cut(monotonic_ns()))
         self._end_when_due()
 
     def _end_when_due(self) -> None:
@@ -119,7 +127,7 @@ class Recorder:
 
     def _drain(self) -> bool:
         """Write what is in the rings, a bounded part at a time; return whether there was anything."""
-        found = False
+        found, self._caught_up = False, True
         for name, ring in self._rings.items():
             try:
                 records = ring.pop_all(_BATCH)
@@ -127,6 +135,7 @@ class Recorder:
                 self._status.error(LogDamaged(damage.what, where=f"the ring of {name}"))
                 continue
             found = found or bool(records)
+            self._caught_up = self._caught_up and len(records) < _BATCH
             self._counts[name] += len(records)
             for kind, time_ns, payload in records:
                 self._write(kind, time_ns, payload)
@@ -138,15 +147,12 @@ class Recorder:
         if self._disk_failed:
             self._lost += 1
             return
-        try:
-            self._log.record(kind, time_ns, payload)
-        except OSError as error:
-            self._disk_error(error)
+        self._to_disk(lambda: self._log.record(kind, time_ns, payload))
 
-    def _flush(self) -> None:
+    def _to_disk(self, act: Callable[[], None]) -> None:
         if not self._disk_failed:
             try:
-                self._log.flush()
+                act()
             except OSError as error:
                 self._disk_error(error)
 
@@ -161,16 +167,12 @@ class Recorder:
         facts = {f"records_{name}": str(count) for name, count in self._counts.items()}
         facts |= {f"dropped_{name}": str(count) for name, count in dropped.items()}
         facts["wall_offset_ns_at_end"] = str(wall_offset_ns())
-        if not self._disk_failed:
-            try:
-                self._log.finish(facts)
-            except OSError as error:
-                self._disk_error(error)
+        self._to_disk(lambda: self._log.finish(facts))
         self._status.say(
             "finished",
             complete=not self._disk_failed,
             messages=self._log.messages,
-            ticks=self._log.chain.ticks,
+            ticks=self._log.ticks,
             records=self._counts,
             dropped=dropped,
             lost=self._lost,

@@ -7,6 +7,8 @@ from typing import Any
 
 import msgspec
 
+from robot_io.errors import LogDamaged
+from robot_io.mcap.files import files_of
 from robot_io.mcap.write import MAGIC
 
 
@@ -45,9 +47,15 @@ def what_is_missing(log: Path, recorder: dict[str, Any], ticks: int) -> str:
     if recorder["ticks"] < ticks:
         return f"it holds {recorder['ticks']} of {ticks} ticks"
     try:
-        with log.open("rb") as file:
-            file.seek(-len(MAGIC), 2)
-            end = file.read()
+        ends = [_end_of(file) for file in files_of(log)]
     except OSError as error:
         return f"it cannot be read: {error.strerror}"
-    return "" if end == MAGIC else "its end is not that of a finished log"
+    except LogDamaged as error:
+        return error.what
+    return "" if all(end == MAGIC for end in ends) else "its end is not that of a finished log"
+
+
+def _end_of(path: Path) -> bytes:
+    with path.open("rb") as file:
+        file.seek(-len(MAGIC), 2)
+        return file.read()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from robot_io.errors import EnvironmentFault
+from robot_io.mcap.files import files_of, part_path
 from tools.view.panels import RERUN_APPLICATION
 
 PROGRAMS = ("rerun", "lichtblick", "foxglove-studio")
@@ -38,21 +39,33 @@ def find_viewer() -> Path | None:
 def open_log(viewer: Path, log: Path, layouts: Layouts) -> None:
     """Open a log, and return when the viewer is closed. Raises EnvironmentFault if it cannot be opened."""
     if viewer.stem == "rerun":
-        recording = layouts.rerun.with_suffix(".rrd")
-        _run(viewer, "mcap", "convert", log, "--application-id", RERUN_APPLICATION, "-o", recording, quiet=True)
-        _run(viewer, recording, layouts.rerun)
+        recordings = _recordings(log, layouts)
+        for file, recording in recordings.items():
+            _run(viewer, "mcap", "convert", file, "--application-id", RERUN_APPLICATION, "-o", recording, quiet=True)
+        _run(viewer, *recordings.values(), layouts.rerun)
     else:
-        _run(viewer, log)
+        _run(viewer, *files_of(log))
 
 
 def by_hand(log: Path, layouts: Layouts) -> list[str]:
     """Return what to do where no viewer is opened."""
-    recording = layouts.rerun.with_suffix(".rrd")
+    recordings = _recordings(log, layouts)
+    converted = [
+        f"rerun mcap convert {file} --application-id {RERUN_APPLICATION} -o {recording}"
+        for file, recording in recordings.items()
+    ]
     return [
         "Lichtblick or Foxglove: open the log, then import the layout from its file in the menu of layouts",
-        f"Rerun: rerun mcap convert {log} --application-id {RERUN_APPLICATION} -o {recording} "
-        f"&& rerun {recording} {layouts.rerun}",
+        f"Rerun: {' && '.join(converted)} && rerun {' '.join(map(str, recordings.values()))} {layouts.rerun}",
     ]
+
+
+def _recordings(log: Path, layouts: Layouts) -> dict[Path, Path]:
+    """Return what Rerun makes of each file of a log."""
+    files, rrd = files_of(log), layouts.rerun.with_suffix(".rrd")
+    if len(files) == 1:
+        return {files[0]: rrd}
+    return {file: part_path(rrd, number) for number, file in enumerate(files, 1)}
 
 
 def _run(program: Path, *words: str | Path, quiet: bool = False) -> None:

@@ -14,6 +14,7 @@ from mcap.records import Attachment, Metadata
 from robot_io.errors import EnvironmentFault, LogDamaged
 from robot_io.ipc.spawn import spawn
 from robot_io.log.log_format import format_of
+from robot_io.mcap.files import files_of
 from robot_io.mcap.log_file import CONFIG_ATTACHMENT, RUN_METADATA
 from robot_io.mcap.walk import walk
 from robot_io.rig.config import RigConfig
@@ -66,7 +67,7 @@ def rig_of_run(run: RunningRun) -> RigConfig:
     log, until_s = Path(run.log), time.monotonic() + BEGUN_WITHIN_S
     while True:
         try:
-            return _rig_of(log)
+            return _rig_of(files_of(log)[-1])
         except LogDamaged:
             if time.monotonic() > until_s:
                 raise

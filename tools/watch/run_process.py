@@ -12,6 +12,8 @@ import socket
 import sys
 import time
 from collections import deque
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import msgspec
@@ -23,8 +25,9 @@ from robot_io.ipc.status import StatusPipe
 from robot_io.log.channels import BY_TOPIC
 from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
+from robot_io.mcap.files import files_of, has_parts, part_path
 from robot_io.mcap.log_file import RUN_METADATA
-from robot_io.mcap.walk import Topic, walk
+from robot_io.mcap.walk import LogItem, Topic, walk
 from robot_io.tick import TICK_CDR, ControlTick, FtReading
 from tools.live.feed import LiveFeed
 from tools.log.derivation import TICK_TOPIC
@@ -54,7 +57,7 @@ class RunFollower:
 
     def __init__(self, run: RunningRun, reports: ReportSender, live: LiveFeed | None) -> None:
         self._run = run
-        self._log = Path(run.log)
+        self._log = self._file = Path(run.log)
         self._reports = reports
         self._live = live
         self._caught_up = False
@@ -66,7 +69,7 @@ class RunFollower:
         channels: dict[int, str] = {}
         log_format = 0
         try:
-            for item in walk(self._log, grown=self._grown):
+            for item in chain.from_iterable(self._walk(file) for file in self._files()):
                 if isinstance(item, Metadata) and item.name == RUN_METADATA:
                     log_format = format_of(item.metadata)
                 elif isinstance(item, Topic):
@@ -84,6 +87,22 @@ class RunFollower:
         self._report()
         return f"the run has ended; its log is {self._log}"
 
+    def _files(self) -> Iterator[Path]:
+        """Yield the file of the log, or its newest part and those that follow it while the run goes on."""
+        number = len(files_of(self._log))
+        if not has_parts(self._log):
+            yield self._log
+            return
+        while (file := part_path(self._log, number)).exists():
+            yield file
+            number += 1
+            while self._run.alive() and not part_path(self._log, number).exists():
+                time.sleep(POLL_S)
+
+    def _walk(self, file: Path) -> Iterator[LogItem]:
+        self._file = file
+        return walk(file, grown=self._grown)
+
     def _message(self, topic: str, message: Message) -> None:
         if topic == TICK_TOPIC:
             self._payloads.append(message.data)
@@ -91,9 +110,9 @@ class RunFollower:
             self._live.add(topic, message.log_time, message.data)
 
     def _grown(self, wanted: int) -> int:
-        while (size := self._log.stat().st_size) < wanted:
+        while (size := self._file.stat().st_size) < wanted:
             alive = self._run.alive()  # looked at before the size, which no longer changes once they have ended
-            size = self._log.stat().st_size
+            size = self._file.stat().st_size
             if size >= wanted or not alive:
                 break
             self._report()

@@ -158,6 +158,6 @@ def test_the_first_format_said_nothing():
     assert format_of({}) == 1
     assert format_of({"format": "1"}) == 1
     assert format_of({"format": "2"}) == 2
-    assert format_of({"format": "4"}) == 4
-    with pytest.raises(UsageError, match="format 5"):
-        format_of({"format": "5"})
+    assert format_of({"format": "5"}) == 5
+    with pytest.raises(UsageError, match="format 6"):
+        format_of({"format": "6"})

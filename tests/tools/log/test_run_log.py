@@ -46,10 +46,10 @@ def test_the_same_records_give_the_same_bytes(tmp_path):
 def test_the_slider_is_where_it_was_seen_and_without_cameras_where_the_world_says(tmp_path, topic, x, rig):
     payloads = write(tmp_path / "run.mcap", f'base.topics.slider_pose="{topic}"', rig=rig)
     transforms = [TF_MESSAGE.decode(payload).transforms[0] for payload in payloads["/tf"]]
-    assert len(transforms) == 20
+    assert len(transforms) == 5, "one in 40 ms of the 20 in 200 ms"
     assert {(t.child_frame_id, t.transform.translation.x) for t in transforms} == {("slider", x)}
     poses = [POSE_STAMPED.decode(payload).pose.position.x for payload in payloads["/slider/pose"]]
-    assert poses == ([7.0] * 20 if topic else [1.0, 7.0] * 20)
+    assert (poses.count(7.0), poses.count(1.0)) == ((20, 0) if topic else (20, 5))
 
 
 def test_the_chain_holds_and_a_change_a_gap_and_a_swap_break_it():

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robot_io.errors import UsageError
+from robot_io.mcap.files import has_parts
 from tools.places.find_log import find_log
+from tools.places.run_dir import LOG
 from tools.report.compare.labels import labels
 from tools.report.page import read_summary_file, run_mark
 from tools.report.run_data import RunData, read_run
@@ -78,7 +80,9 @@ def path_notes(runs: Sequence[ComparedRun]) -> list[str]:
 def _trials(folder: Path) -> list[Path]:
     """Return the logs of a folder of trials; empty for anything else, also for what cannot be read."""
     try:
-        return [] if (folder / "run.mcap").exists() else sorted(folder.glob(f"{TRIALS}/run.mcap"))
+        if (folder / LOG).exists() or has_parts(folder / LOG):
+            return []
+        return sorted(trial / LOG for trial in folder.glob(TRIALS) if (trial / LOG).exists() or has_parts(trial / LOG))
     except OSError:
         return []
 
