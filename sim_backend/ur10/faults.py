@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sim_backend.ur10.client_ports.servers import ClientPorts
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import DashboardServer
 from sim_backend.ur10.modes import RobotMode, SafetyMode
@@ -18,7 +19,7 @@ class UrFaults:
     controller: UrController
     rtde: RtdeServer
     dashboard: DashboardServer
-    scripts: list[TcpServer]
+    ports: ClientPorts
 
     def set_robot_mode(self, mode: int) -> None:
         """Set the robot mode (see `RobotMode`); below RUNNING the program ends."""
@@ -155,4 +156,4 @@ class UrFaults:
         self.rtde.close_clients()
 
     def _servers(self) -> list[TcpServer]:
-        return [self.rtde, self.dashboard, *self.scripts]
+        return [self.rtde, self.dashboard, *self.ports.servers]
