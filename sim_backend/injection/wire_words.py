@@ -27,7 +27,7 @@ WIRE_KINDS: dict[str, dict[str, tuple[float, ...]]] = {
         "silent": (), "streaming": (), "latency": (16.0,), "echo": (), "other-device": (), "busy": (), "shared": (),
     },
     "arm": {
-        "silent": (), "dashboard-silent": (), "truncated": (20.0,), "version": (5.11,), "other-model": (),
+        "silent": (), "dashboard-silent": (), "truncated": (20.0,), "version": (10.07,), "other-model": (),
         "safeguard-stop": (), "brakes-on": (), "paused-program": (), "turned": (1.0,), "inputs-taken": (),
     },
     "base": {
@@ -39,7 +39,7 @@ WIRE_KINDS: dict[str, dict[str, tuple[float, ...]]] = {
 """What only the wire has: for each kind its value where none is given; no value where it takes none."""
 
 ON_THE_WIRE: dict[str, tuple[str, ...]] = {
-    "ft": tuple(KINDS["ft"]),
+    "ft": tuple(kind for kind in KINDS["ft"] if kind != "zeroed"),
     "arm": (
         "off", "garbage", "wrong", "moving", "drifting", "protective-stop", "emergency-stop", "powered-off",
         "freedrive", "other-program", "lost",

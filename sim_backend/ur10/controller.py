@@ -11,8 +11,9 @@ from collections import deque
 
 from robot_io.clock import NS_PER_MS, NS_PER_S
 from robot_io.messages import Joints
+from sim_backend.ur10.force_sensor import ForceSensor
 from sim_backend.ur10.models import UrModel
-from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode
+from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode, SafetyStatus
 from sim_backend.ur10.motion.arm_motion import ArmMotion
 from sim_backend.ur10.motion.kinematics import tool_pose, tool_speed
 from sim_backend.ur10.motion.transforms import Pose6
@@ -21,7 +22,7 @@ from sim_backend.ur10.programs.load import OtherProgram, program_of
 from sim_backend.ur10.programs.program import Program, ProgramRefused, ScriptError
 from sim_backend.ur10.registers import Registers, Watchdog
 from sim_backend.ur10.reports import STARTED, STOPPED, KeyReport, ProgramError, Report, SafetyModeReport
-from sim_backend.world.plant import ArmSource
+from sim_backend.world.plant import ArmSource, FtSource
 
 PROGRAM_START_NS = 50 * NS_PER_MS
 UNLOCK_AFTER_NS = 5 * NS_PER_S
@@ -32,7 +33,14 @@ START_TIME_S = 1000.0
 class UrController:
     """State of one robot; `cycle` advances it, everything else changes it at once."""
 
-    def __init__(self, source: ArmSource, model: UrModel, now_ns: int, power_step_s: float = 1.0) -> None:
+    def __init__(
+        self,
+        source: ArmSource,
+        model: UrModel,
+        now_ns: int,
+        power_step_s: float = 1.0,
+        wrench: FtSource | None = None,
+    ) -> None:
         self.model = model
         self.version = model.version
         self.registers = Registers()
@@ -50,8 +58,10 @@ class UrController:
         """For the clients of the primary port, oldest first."""
         self.refusals: deque[str] = deque(maxlen=1000)
         """What a program wanted and this controller does not do, in words for the person at the terminal."""
+        self.force_sensor = ForceSensor(wrench)
         self.robot_mode = RobotMode.RUNNING
         self.safety_mode = SafetyMode.NORMAL
+        self.safeguard = SafetyStatus.SAFEGUARD_STOP
         self.runtime_state = RuntimeState.STOPPED
         self.teach_button = False
         self.program: Program | None = None
@@ -93,6 +103,27 @@ class UrController:
     def tcp_speed(self) -> Pose6:
         """Speed of the tool's centre point in the arm's base frame: m/s, rad/s."""
         return tool_speed(self.motion.actual, self.motion.velocity, self.model, self.tcp_offset)
+
+    @property
+    def safety_status(self) -> SafetyStatus:
+        """The safety mode as an e-Series says it, which tells safeguard stops apart."""
+        return self.safeguard if self.safety_mode == SafetyMode.SAFEGUARD_STOP else SafetyStatus(self.safety_mode)
+
+    @property
+    def raw_wrench(self) -> Joints:
+        """What the sensor at the flange reads, in its axes: N, N*m. Zeros without one."""
+        return self.force_sensor.raw(self._now_ns)
+
+    @property
+    def tcp_force(self) -> Joints:
+        """Wrench on the tool in the axes of the arm's base: N, N*m. Of the sensor, or as a client feeds it in."""
+        if not self.force_sensor.fitted:
+            return self.external_wrench
+        return self.force_sensor.compensated(self._now_ns, self.motion.actual, self.payload_kg, self.payload_cog_m)
+
+    def zero_force_sensor(self) -> None:
+        """Make the force on the tool zero as it is now, as `zero_ftsensor()` does. The raw wrench stays."""
+        self.force_sensor.zero(self._now_ns, self.motion.actual, self.payload_kg, self.payload_cog_m)
 
     @property
     def reported_q(self) -> Joints:
@@ -244,8 +275,9 @@ class UrController:
         self.safety_mode = SafetyMode.PROTECTIVE_STOP
         self._stopped_ns = self._now_ns
 
-    def trip_safeguard_stop(self) -> None:
-        """Stop as for an opened safety fence; the program is paused."""
+    def trip_safeguard_stop(self, status: SafetyStatus = SafetyStatus.SAFEGUARD_STOP) -> None:
+        """Stop as for an opened safety fence; the program is paused. An e-Series tells which safeguard it was."""
+        self.safeguard = status
         self.pause_program()
         self.safety_mode = SafetyMode.SAFEGUARD_STOP
 

@@ -36,7 +36,7 @@ class Dashboard:
             "polyscopeversion": self._version,
             "robotmode": lambda: f"Robotmode: {robot.robot_mode.name}",
             "safetymode": lambda: f"Safetymode: {robot.safety_mode.name}",
-            "safetystatus": lambda: f"Safetystatus: {robot.safety_mode.name}",
+            "safetystatus": lambda: f"Safetystatus: {robot.safety_status.name}",
             "running": lambda: f"Program running: {str(robot.runtime_state == RuntimeState.PLAYING).lower()}",
             "programstate": self._program_state,
             "stop": self._stop,

@@ -19,7 +19,7 @@ from sim_backend.ur10.models import UR10, UrModel, Version
 from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
-from sim_backend.world.plant import ArmSource
+from sim_backend.world.plant import ArmSource, FtSource
 
 REAL_CLOCK = 0.99992
 """What an outside clock makes of a controller's rate."""
@@ -31,8 +31,8 @@ class UrEmulator(UrFaults):
 
     `rate_hz` is the control cycle measured by an outside clock (a real one is never exactly 125 or 500 Hz; None: as
     one is); `phase` (0..1) shifts its grid; `version` is another PolyScope than the model's; `warn` is told in words
-    what a program wanted and this controller does not do. The fault methods are those of `UrFaults`; `requests` and
-    `counters` record what happened.
+    what a program wanted and this controller does not do; `wrench` feeds the sensor at the flange, which only an
+    e-Series arm has. The fault methods are those of `UrFaults`; `requests` and `counters` record what happened.
     Raises EnvironmentFault when a port is taken, UsageError for an address that is not loopback.
     """
 
@@ -49,10 +49,11 @@ class UrEmulator(UrFaults):
         programs: tuple[str, ...] = ("/programs/other.urp",),
         power_step_s: float = 1.0,
         warn: Callable[[str], None] = lambda _words: None,
+        wrench: FtSource | None = None,
     ) -> None:
         self.host = host
         self.requests = RequestLog()
-        self.controller = UrController(source, model, monotonic_ns(), power_step_s)
+        self.controller = UrController(source, model, monotonic_ns(), power_step_s, wrench)
         self.controller.version = version or model.version
         self._loop = loop
         self._warn = warn

@@ -1,4 +1,4 @@
-"""The RTDE variables of a CB3 controller: name, type on the wire, and how the emulator reads or writes the value.
+"""The RTDE variables of a UR controller: name, type on the wire, and how the emulator reads or writes the value.
 
 Source: Universal Robots RTDE guide. Clients decode by their own table, so the types must be the documented ones.
 Quantities that are not modelled are constants of a healthy robot at rest.
@@ -11,6 +11,7 @@ from collections.abc import Callable
 import msgspec
 
 from sim_backend.ur10.controller import UrController
+from sim_backend.ur10.models import Version
 from sim_backend.ur10.modes import RobotMode, joint_mode, robot_status_bits, safety_bits
 from sim_backend.ur10.outputs import CONFIGURABLE, STANDARD, TOOL
 from sim_backend.ur10.registers import REGISTERS
@@ -47,9 +48,9 @@ class Input(msgspec.Struct, frozen=True):
     write: Callable[[UrController, Values, int], None]
 
 
-def output_field(name: str) -> Output | None:
-    """Return the output called `name`, or None (NOT_FOUND)."""
-    return _OUTPUTS.get(name)
+def output_field(name: str, version: Version) -> Output | None:
+    """Return the output called `name` in a version of PolyScope, or None (NOT_FOUND)."""
+    return _OUTPUTS.get(name) if version >= _SINCE.get(name, version) else None
 
 
 def input_field(name: str) -> Input | None:
@@ -66,7 +67,7 @@ def _zeros(type_name: str) -> Output:
 
 
 def _wrench(robot: UrController) -> Values:
-    return robot.external_wrench
+    return robot.tcp_force
 
 
 def _pose(robot: UrController) -> Values:
@@ -107,7 +108,7 @@ _OUTPUTS: dict[str, Output] = {
     "robot_mode": Output("INT32", lambda r: (int(r.robot_mode),)),
     "joint_mode": Output("VECTOR6INT32", _joint_modes),
     "safety_mode": Output("INT32", lambda r: (int(r.safety_mode),)),
-    "safety_status": Output("INT32", lambda r: (int(r.safety_mode),)),
+    "safety_status": Output("INT32", lambda r: (int(r.safety_status),)),
     "actual_tool_accelerometer": _constant("VECTOR3D", 0.0, -9.8, 0.0),
     "speed_scaling": Output("DOUBLE", lambda r: (r.speed_scaling,)),
     "target_speed_fraction": Output("DOUBLE", lambda r: (r.speed_fraction,)),
@@ -139,12 +140,16 @@ _OUTPUTS: dict[str, Output] = {
     "tool_output_voltage": _constant("INT32", 0),
     "tool_output_current": _constant("DOUBLE", 0.0),
     "tool_temperature": _constant("DOUBLE", 36.0),
-    "tcp_force_scalar": Output("DOUBLE", lambda r: (sum(f * f for f in r.external_wrench[:3]) ** 0.5,)),
+    "tcp_force_scalar": Output("DOUBLE", lambda r: (sum(f * f for f in r.tcp_force[:3]) ** 0.5,)),
+    "ft_raw_wrench": Output("VECTOR6D", lambda r: r.raw_wrench),
     "tcp_offset": Output("VECTOR6D", lambda r: r.tcp_offset),
     "payload": Output("DOUBLE", lambda r: (r.payload_kg,)),
     "payload_cog": Output("VECTOR3D", lambda r: r.payload_cog_m),
     "payload_inertia": _zeros("VECTOR6D"),
 }
+
+_SINCE: dict[str, Version] = {"ft_raw_wrench": (5, 9, 0, 0)}
+"""From which version on there is an output that older ones do not have."""
 
 
 def _masked(name: str, type_name: str, use: Callable[[UrController], None]) -> Input:

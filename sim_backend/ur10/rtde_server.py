@@ -161,7 +161,7 @@ class RtdeClient(TcpClient):
             (frequency_hz,) = struct.unpack_from(">d", body)
             body = body[8:]
         names = _names(body)
-        fields = [output_field(name) for name in names]
+        fields = [output_field(name, self.rtde.robot.version) for name in names]
         types = ",".join("NOT_FOUND" if field is None else field.type for field in fields)
         found = [field for field in fields if field is not None]
         complete = bool(names) and len(found) == len(names)

@@ -43,7 +43,7 @@ _SINCE_3_0: tuple[Row, ...] = (
     ("I control", "double[6]", always((0.05, 4.6, 2.4, 0.4, 0.05, 0.02))),
     ("tool vector actual", "double[6]", lambda r: r.tcp_pose),
     ("TCP speed actual", "double[6]", lambda r: r.tcp_speed),
-    ("TCP force", "double[6]", lambda r: r.external_wrench),
+    ("TCP force", "double[6]", lambda r: r.tcp_force),
     ("tool vector target", "double[6]", lambda r: r.tcp_pose),
     ("TCP speed target", "double[6]", lambda r: r.tcp_speed),
     ("digital input bits", "double", always(0.0)),

@@ -132,6 +132,8 @@ class ControlScript:
             robot.payload_cog_m = (doubles[1], doubles[2], doubles[3])
         elif command == Command.SET_TCP:
             robot.tcp_offset = self._six(robot, 0)
+        elif command == Command.ZERO_FT_SENSOR:
+            robot.zero_force_sensor()
         elif command == Command.PROTECTIVE_STOP:
             robot.trip_protective_stop()
         elif command in (Command.END_TEACH_MODE, Command.END_FREEDRIVE_MODE, Command.SET_GRAVITY):

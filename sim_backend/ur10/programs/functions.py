@@ -196,6 +196,10 @@ class Functions:
         """Stop as for a collision."""
         self._robot.trip_protective_stop()
 
+    def zero_ftsensor(self) -> None:
+        """Make the force on the tool zero."""
+        self._robot.zero_force_sensor()
+
     def halt(self) -> None:
         """End the program."""
         raise Halted
@@ -231,6 +235,7 @@ def _table_of(program: Functions) -> dict[str, Function]:
         "movej": program.movej, "movel": program.movel, "servoj": program.servoj, "speedj": program.speedj,
         "speedl": program.speedl, "stopj": program.stop, "stopl": program.stop, "sleep": program.sleep,
         "sync": program.sync, "halt": program.halt, "protective_stop": program.protective_stop,
+        "zero_ftsensor": program.zero_ftsensor,
         "textmsg": program.textmsg, "popup": program.popup, "to_str": as_text,
         "set_tcp": program.set_tcp, "get_tcp_offset": program.get_tcp_offset, "set_gravity": program.set_gravity,
         "set_payload": program.set_payload, "set_payload_mass": program.set_payload,

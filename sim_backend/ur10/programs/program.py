@@ -31,6 +31,10 @@ class Robot(Protocol):
         """Pose of the tool's centre point."""
         ...
 
+    def zero_force_sensor(self) -> None:
+        """Make the force on the tool zero as it is now."""
+        ...
+
     def trip_protective_stop(self) -> None:
         """Stop as for a collision."""
         ...
