@@ -46,7 +46,7 @@ class UrEmulator(UrFaults):
         rate_hz: float | None = None,
         phase: float = 0.21,
         version: Version | None = None,
-        programs: tuple[str, ...] = ("/programs/other.urp",),
+        programs: tuple[str, ...] = (),
         power_step_s: float = 1.0,
         warn: Callable[[str], None] = lambda _words: None,
         wrench: FtSource | None = None,
