@@ -15,7 +15,7 @@ from sim_backend.ur10.force_sensor import ForceSensor
 from sim_backend.ur10.models import UrModel
 from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode, SafetyStatus
 from sim_backend.ur10.motion.arm_motion import ArmMotion
-from sim_backend.ur10.motion.kinematics import tool_pose, tool_speed
+from sim_backend.ur10.motion.tool_state import ToolState
 from sim_backend.ur10.motion.transforms import Pose6
 from sim_backend.ur10.outputs import MaskedInputs, Outputs
 from sim_backend.ur10.programs.load import OtherProgram, program_of
@@ -77,6 +77,7 @@ class UrController:
         self._waiting: tuple[int, Program] | None = None
         self._power_at: tuple[int, RobotMode] | None = None
         self._release_next = False
+        self._tool = ToolState(model)
         self.motion.step(source.read_arm(now_ns), model.cycle_s)
 
     @property
@@ -97,12 +98,12 @@ class UrController:
     @property
     def tcp_pose(self) -> Pose6:
         """Pose of the tool's centre point in the arm's base frame: m, rotation vector in rad."""
-        return tool_pose(self.motion.actual, self.model, self.tcp_offset)
+        return self._tool.now(self.motion.actual, self.motion.velocity, self.tcp_offset)[0]
 
     @property
     def tcp_speed(self) -> Pose6:
         """Speed of the tool's centre point in the arm's base frame: m/s, rad/s."""
-        return tool_speed(self.motion.actual, self.motion.velocity, self.model, self.tcp_offset)
+        return self._tool.now(self.motion.actual, self.motion.velocity, self.tcp_offset)[1]
 
     @property
     def safety_status(self) -> SafetyStatus:

@@ -36,13 +36,17 @@ class PortClient(TcpClient):
         if not self._programs.feed(data):
             self.close()
 
+    @property
+    def behind(self) -> bool:
+        """Whether the client has so much unread that it is to get no more; counts what it loses."""
+        behind = self.queued_bytes > DROP_ABOVE_BYTES
+        self._port.dropped += behind
+        return behind
+
     def give(self, packet: bytes) -> None:
-        """Send a packet of state unless the client is behind."""
-        if self.queued_bytes > DROP_ABOVE_BYTES:
-            self._port.dropped += 1
-        else:
-            self._port.sent += 1
-            self.send(packet)
+        """Send a packet of state."""
+        self._port.sent += 1
+        self.send(packet)
 
 
 class PortServer(TcpServer):
@@ -101,7 +105,7 @@ class ClientPorts:
             for client in readers:
                 if client.greeted:
                     client.send(message)
-        if clients := self._realtime_port.ready():
+        if clients := [client for client in self._realtime_port.ready() if not client.behind]:
             packet = realtime_packet(self._realtime, robot)
             for client in clients:
                 client.give(packet)
@@ -110,7 +114,7 @@ class ClientPorts:
         if self._state_due >= 1.0 - 1e-9:
             self._state_due -= 1.0
             for server in (self._primary, self._secondary):
-                greeted = [client for client in server.ready() if client.greeted]
+                greeted = [client for client in server.ready() if client.greeted and not client.behind]
                 self._send_state(greeted, server is self._primary, first=False)
 
     def _greet(self) -> None:

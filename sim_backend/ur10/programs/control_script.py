@@ -24,6 +24,12 @@ CONTROL_SCRIPT_MARK = "RTDE Control Script"
 _OFFSET = re.compile(r"# float register offset\s*\n\s*(0|24)\b")
 _PATH = re.compile(r"def exec_move_path\(\):\s*\n(.*?)\n\s*end\b", re.DOTALL)
 
+_NOTHING_TO_DO = frozenset({
+    Command.END_TEACH_MODE, Command.END_FREEDRIVE_MODE,  # the arm is never compliant
+    Command.SET_GRAVITY,  # it feels none
+    Command.SET_EXTERNAL_FORCE_TORQUE,  # comes by a register of its own
+})  # fmt: skip
+
 READY = 1
 DONE = 2
 
@@ -136,8 +142,8 @@ class ControlScript:
             robot.zero_force_sensor()
         elif command == Command.PROTECTIVE_STOP:
             robot.trip_protective_stop()
-        elif command in (Command.END_TEACH_MODE, Command.END_FREEDRIVE_MODE, Command.SET_GRAVITY):
-            pass  # the arm is never compliant, and feels no gravity
+        elif command in _NOTHING_TO_DO:
+            pass
         elif not answer(command, doubles, robot, self.offset):
             raise self._refused(f"`{NAMES.get(command, command)}` is not emulated")
 
