@@ -83,7 +83,7 @@ def test_a_secondary_program_leaves_the_running_one_alone(robot) -> None:
 def test_a_new_program_replaces_the_running_one(robot) -> None:
     upload(robot.host, "def first():\n  sleep(60)\nend\n")
     wait_until(lambda: runtime(robot) == PLAYING, "the first plays")
-    upload(robot.host, "def second():\n  sync()\nend\n")
+    upload(robot.host, "def second():\n  sleep(60)\nend\n")
     wait_until(lambda: robot.get("counters.programs_started") == 2, "the second plays")
     assert robot.get("controller.program.name") == "second"
 
@@ -97,7 +97,7 @@ def test_a_single_line_runs_and_ends(robot) -> None:
 @pytest.mark.parametrize("fault", [("set_robot_mode", 5), ("protective_stop",), ("ignore_scripts",)])
 def test_programs_are_refused_without_a_word(robot, fault) -> None:
     robot.call(*fault)
-    upload(robot.host, "def first():\n  sync()\nend\n")
+    upload(robot.host, "def first():\n  sleep(60)\nend\n")
     wait_until(lambda: robot.get("counters.scripts_refused") == 1, "it is refused")
     assert runtime(robot) == STOPPED
 
@@ -105,7 +105,7 @@ def test_programs_are_refused_without_a_word(robot, fault) -> None:
 def test_a_stop_before_the_start_refuses_the_program(robot) -> None:
     """The controller takes a moment between upload and start."""
     with socket.create_connection((robot.host, 30003), timeout=3) as connection:
-        connection.sendall(b"def first():\n  sync()\nend\n")
+        connection.sendall(b"def first():\n  sleep(60)\nend\n")
         wait_until(lambda: robot.get("controller._waiting") is not None, "it is about to start")
         robot.call("protective_stop")
     wait_until(lambda: robot.get("counters.scripts_refused") == 1, "it is refused")
