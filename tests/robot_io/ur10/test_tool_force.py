@@ -2,8 +2,6 @@
 
 import contextlib
 import itertools
-import math
-import struct
 import time
 
 import pytest
@@ -12,7 +10,6 @@ from robot_io.errors import ConfigError, DeviceNotReady, DeviceProtocolError
 from robot_io.messages import LinkState
 from robot_io.ur10.driver import Ur10
 from robot_io.ur10.tool_force import UrToolForce
-from robot_io.ur10.tool_packets import BiasWatch, Packet, PacketParser, in_flange
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
 READING = (1.0, 2.0, -15.0, 0.1, 0.2, 0.3)
@@ -32,29 +29,6 @@ def sensor(robot):
 
 def newest(sensor: UrToolForce):
     return wait_until(sensor.drain, "a reading")[-1]
-
-
-def test_the_flange_of_the_outstretched_arm() -> None:
-    """All joints zero, from UR's drawing: flange z to -y, x to +x, y to +z of the base (+90 degrees about x)."""
-    assert in_flange((0.0,) * 6, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)) == pytest.approx((1.0, 3.0, -2.0, 4.0, 6.0, -5.0))
-
-
-def test_a_joint_turns_the_base_under_the_flange() -> None:
-    """Base joint at +90 degrees: what was along the base's y is along x of the arm, and so on."""
-    q = (math.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0)
-    assert in_flange(q, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)) == pytest.approx((1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert in_flange(q, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
-
-
-def test_the_held_pose_points_forward() -> None:
-    """docs/frames-and-signs.md: in the held pose z points forward; the arm stands turned by +90 degrees on the base.
-
-    So forward is -y of the arm's base, and up is its z: x of the flange is (0, sin a, cos a) in the BODY frame.
-    """
-    held, a = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31), math.pi / 2 - 1.31
-    forward, up = (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)
-    assert in_flange(held, (*forward, 0.0, 0.0, 0.0))[:3] == pytest.approx((0.0, 0.0, 1.0), abs=1e-3)
-    assert in_flange(held, (*up, 0.0, 0.0, 0.0))[:3] == pytest.approx((math.cos(a), math.sin(a), 0.0), abs=1e-3)
 
 
 def test_raw_readings_come_as_they_are(robot, sensor) -> None:
@@ -195,42 +169,3 @@ def test_a_silent_controller_is_refused_in_time(robot) -> None:
     with pytest.raises(Exception, match="sends nothing"):
         UrToolForce(robot.host).open()
     assert time.monotonic() - began_s < 3.5
-
-
-# --- pure
-
-
-def packets(count: int, raw=READING, force=READING) -> list[Packet]:
-    return [Packet(float(i), raw, force) for i in range(count)]
-
-
-def test_bytes_in_any_pieces_are_the_same_packets() -> None:
-    frame = struct.pack(">HBB", 156, ord("U"), 1) + struct.pack(">19d", 5.0, *(0.0,) * 6, *(0.0,) * 6, *READING)
-    for size in (1, 7, 155, 156, 400):
-        parser = PacketParser(with_raw=True)
-        stream = frame * 3
-        found = [one for i in range(0, len(stream), size) for one in parser.feed(stream[i : i + size])]
-        assert [(one.controller_s, one.raw) for one in found] == [(5.0, READING)] * 3
-
-
-@pytest.mark.parametrize("data", ["0000", "000055", "ffff55", "000341", "00045501"])
-def test_what_cannot_be_a_packet_is_refused(data: str) -> None:
-    with pytest.raises(ValueError):
-        PacketParser(with_raw=True).feed(bytes.fromhex(data).ljust(4, b"\0"))
-
-
-@pytest.mark.parametrize(("off_N", "lasting", "jumps"), [(2.9, 200, 0), (3.1, 49, 0), (3.1, 50, 1), (40.0, 120, 1)])
-def test_a_jump_lasts_and_is_counted_once(off_N: float, lasting: int, jumps: int) -> None:
-    watch = BiasWatch()
-    for packet in packets(100) + packets(lasting, force=(READING[0] + off_N, *READING[1:])):
-        watch.take(packet)
-    assert watch.jumps == jumps
-
-
-def test_a_force_is_no_jump() -> None:
-    """Both readings change alike, however suddenly: 40 N within one packet."""
-    watch = BiasWatch()
-    hit = (READING[0], READING[1], READING[2] - 40.0, *READING[3:])
-    for packet in packets(100) + packets(200, raw=hit, force=hit):
-        watch.take(packet)
-    assert watch.jumps == 0
