@@ -235,3 +235,38 @@ def test_a_client_that_does_not_read_loses_state_and_no_more(robot) -> None:
         lazy.connect((robot.host, 30003))
         while robot.get("counters.state_dropped") == dropped:
             assert len(keen.raw()) == 1220
+
+
+@pytest.mark.long
+def test_a_script_of_variables_poses_and_moves_comes_where_it_says(robot) -> None:
+    """0.1 m along the tool's y axis, without a turn: UR's own example for sending a script."""
+    with closing(Packets(robot.host, 30001)) as client:
+        client.next(16)
+        client.send(
+            "def example():\n  movej([0,-1.2,1.2,-0.1,1.57,0])\n  sleep(0.6)\n  here = get_target_tcp_pose()\n"
+            "  way = p[0,-0.1,0,0,0,0]\n  movel(pose_trans(here, way), t=1)\nend\n"
+        )
+        client.message(7)
+        there = pytest.approx([0, -1.2, 1.2, -0.1, 1.57, 0], abs=1e-9)
+        wait_until(lambda: robot.get("controller.motion.actual") == there, "there")
+        here = robot.get("controller.tcp_pose")
+        assert client.message(7)[-26:] == b"PROGRAM_XXX_STOPPEDexample"
+    there = robot.get("controller.tcp_pose")
+    assert there[3:] == pytest.approx(here[3:], abs=1e-9)
+    assert sum((a - b) ** 2 for a, b in zip(here[:3], there[:3], strict=True)) == pytest.approx(0.01)
+
+
+def test_registers_go_through_a_program(robot) -> None:
+    """The mirror that UR's own example for writing over RTDE uploads."""
+    with closing(Packets(robot.host, 30001)) as client:
+        client.send(
+            "def mirror():\n  while (True):\n"
+            "    write_output_boolean_register(64, not read_input_boolean_register(64))\n"
+            "    write_output_integer_register(24, read_input_integer_register(24) + 1)\n"
+            "    write_output_float_register(24, -1.0 * read_input_float_register(24))\n"
+            "    sync()\n  end\nend\n"
+        )
+        wait_until(lambda: robot.get("controller.registers.int_out")[24] == 1, "0 + 1")
+        assert robot.get("controller.registers.bits_out")[64] is True
+        client.send("stop program\n")
+        wait_until(lambda: robot.get("controller.runtime_state") == 1, "stopped")
