@@ -218,6 +218,7 @@ def test_the_commands_of_urs_own_client(robot) -> None:
         client.send("set speed 0.25\n")
         wait_until(lambda: robot.get("controller.speed_fraction") == 0.25, "slower")
         client.send("set speed 1\n")
+        wait_until(lambda: robot.get("controller.speed_fraction") == 1.0, "as before")
 
 
 def test_a_safety_mode_is_reported(robot) -> None:
