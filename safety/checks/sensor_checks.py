@@ -35,7 +35,7 @@ def check(
     if inp.ft.link == LinkState.LOST:
         faults.append("F02")
     if inp.ft.bias_jumps:
-        faults.append("F13")
+        faults.append("F15")
     age_ns = inp.now_ns - last_ns
     if age_ns > STALE_STOP_NS:
         faults.append(Finding("F01-stop", age_ns / NS_PER_MS))

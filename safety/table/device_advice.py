@@ -85,7 +85,7 @@ DEVICE_ADVICE: dict[str, Advice] = {
         "The sensor sends slowly, packets are lost, or the adapter bunches them.",
         "Set the adapter's latency timer to 1 ms; compare `packets_ok` with the declared rate.",
     ),
-    "F13": Advice(
+    "F15": Advice(
         "Somebody zeroed the arm's sensor or changed its payload at the pendant, or the sensor was overloaded.",
         "Leave zero and payload alone during a run. Where nobody touched them, look at the arm's log; then tare again.",
     ),
