@@ -17,7 +17,7 @@ from sim_backend.ur10.dashboard import Dashboard, DashboardServer
 from sim_backend.ur10.faults import UrFaults
 from sim_backend.ur10.models import UR10, UrModel, Version
 from sim_backend.ur10.request_log import RequestLog
-from sim_backend.ur10.rtde_server import RtdeServer
+from sim_backend.ur10.rtde.server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
 from sim_backend.world.plant import ArmSource, FtSource
 

@@ -9,7 +9,7 @@ from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import DashboardServer
 from sim_backend.ur10.modes import RobotMode, SafetyMode, SafetyStatus
 from sim_backend.ur10.registers import REGISTERS
-from sim_backend.ur10.rtde_server import RtdeServer
+from sim_backend.ur10.rtde.server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
 
 

@@ -20,7 +20,7 @@ from sim_backend.ur10.motion.kinematics import tool_pose
 from sim_backend.ur10.motion.transforms import rotation_vector
 from sim_backend.ur10.registers import Registers, Watchdog
 from sim_backend.ur10.request_log import RequestLog
-from sim_backend.ur10.rtde_server import RtdeServer
+from sim_backend.ur10.rtde.server import RtdeServer
 from sim_backend.ur10.standalone import HELD_POSE_RAD, StillArm
 from sim_backend.world.plant import ArmTruth
 from tests.wire.ur_process import fresh_address
