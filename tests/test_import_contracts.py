@@ -24,6 +24,10 @@ OFFENCES = {
             "no emulator knows the driver of its device",
         },
     ),
+    "sim_backend/ur10/motion": (
+        "sim_backend.ur10.programs.load",
+        {"the rooms of the emulated arm: motion knows no program, programs know no wire"},
+    ),
     "sim_backend/physics": ("socket", {"physics knows no wire, file or process"}),
     "safety": ("control.wrench", {LAYERS}),
     "tools/places": (

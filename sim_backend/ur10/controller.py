@@ -7,15 +7,21 @@ unlocking leaves it paused; an emergency stop ends the program and switches the 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 from robot_io.clock import NS_PER_MS, NS_PER_S
 from robot_io.messages import Joints
 from sim_backend.ur10.force_sensor import ForceSensor
 from sim_backend.ur10.models import UrModel
 from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode, SafetyStatus
-from sim_backend.ur10.motion import ArmMotion
-from sim_backend.ur10.program import OtherProgram, Program, program_of
+from sim_backend.ur10.motion.arm_motion import ArmMotion
+from sim_backend.ur10.motion.tool_state import ToolState
+from sim_backend.ur10.motion.transforms import Pose6
+from sim_backend.ur10.outputs import MaskedInputs, Outputs
+from sim_backend.ur10.programs.load import OtherProgram, program_of
+from sim_backend.ur10.programs.program import Program, ProgramRefused, ScriptError
 from sim_backend.ur10.registers import Registers, Watchdog
+from sim_backend.ur10.reports import STARTED, STOPPED, KeyReport, ProgramError, Report, SafetyModeReport
 from sim_backend.world.plant import ArmSource, FtSource
 
 PROGRAM_START_NS = 50 * NS_PER_MS
@@ -38,12 +44,20 @@ class UrController:
         self.model = model
         self.version = model.version
         self.registers = Registers()
-        self.motion = ArmMotion(model.range_rad)
+        self.motion = ArmMotion(model)
         self.watchdog: Watchdog | None = None
         self.payload_kg = 0.0
         self.payload_cog_m = (0.0, 0.0, 0.0)
         self.tcp_offset: Joints = (0.0,) * 6
         self.external_wrench: Joints = (0.0,) * 6
+        self.io = Outputs()
+        self.masked_inputs = MaskedInputs()
+        self.speed_fraction = 1.0
+        """The speed slider, 0..1."""
+        self.reports: deque[Report] = deque(maxlen=1000)
+        """For the clients of the primary port, oldest first."""
+        self.refusals: deque[str] = deque(maxlen=1000)
+        """What a program wanted and this controller does not do, in words for the person at the terminal."""
         self.force_sensor = ForceSensor(wrench)
         self.robot_mode = RobotMode.RUNNING
         self.safety_mode = SafetyMode.NORMAL
@@ -59,14 +73,37 @@ class UrController:
         self._power_step_ns = int(power_step_s * NS_PER_S)
         self._now_ns = now_ns
         self._stopped_ns = 0
+        self._reported_safety = self.safety_mode
         self._waiting: tuple[int, Program] | None = None
         self._power_at: tuple[int, RobotMode] | None = None
+        self._release_next = False
+        self._tool = ToolState(model)
         self.motion.step(source.read_arm(now_ns), model.cycle_s)
 
     @property
     def time_s(self) -> float:
         """The controller's own clock, s: it advances by exactly one cycle time per cycle."""
         return START_TIME_S + self.counters["cycles"] * self.model.cycle_s + self.time_jump_s
+
+    @property
+    def time_ns(self) -> int:
+        """The controller's own clock, ns, as its messages are stamped."""
+        return max(0, round(self.time_s * NS_PER_S))
+
+    @property
+    def speed_scaling(self) -> float:
+        """The share of their speed (0..1) at which programs move the arm."""
+        return self.speed_fraction
+
+    @property
+    def tcp_pose(self) -> Pose6:
+        """Pose of the tool's centre point in the arm's base frame: m, rotation vector in rad."""
+        return self._tool.now(self.motion.actual, self.motion.velocity, self.tcp_offset)[0]
+
+    @property
+    def tcp_speed(self) -> Pose6:
+        """Speed of the tool's centre point in the arm's base frame: m/s, rad/s."""
+        return self._tool.now(self.motion.actual, self.motion.velocity, self.tcp_offset)[1]
 
     @property
     def safety_status(self) -> SafetyStatus:
@@ -104,22 +141,60 @@ class UrController:
         if self._power_at is not None and now_ns >= self._power_at[0]:
             self.robot_mode = self._power_at[1]
             self._power_at = None
+            if self._release_next:
+                self._release_next = False
+                self.release_brakes()
         if self._waiting is not None and now_ns >= self._waiting[0]:
             self._begin_program(self._waiting[1])
         if self.watchdog is not None and self.watchdog.tripped(now_ns):
             self.counters["watchdog_trips"] += 1
             self.stop_program()
-        playing = self.runtime_state == RuntimeState.PLAYING
-        if playing and self.program is not None and not self.program.step(self, now_ns):
+        if self.runtime_state == RuntimeState.PLAYING and self.program is not None:
+            self._step_program(self.program, now_ns)
+        self.motion.step(self._source.read_arm(now_ns), self.model.cycle_s, self.speed_scaling)
+        if self.motion.tripped is not None:
+            self.reports.append(self.motion.tripped)
+            self.motion.tripped = None
+            self.trip_protective_stop()
+        if self.safety_mode != self._reported_safety:
+            self._reported_safety = self.safety_mode
+            self.reports.append(SafetyModeReport(self.safety_mode))
+
+    def _step_program(self, program: Program, now_ns: int) -> None:
+        try:
+            if not program.step(self, now_ns):
+                self.stop_program()
+        except ScriptError as error:
+            self._report_error(program.name, error)
             self.stop_program()
-        self.motion.step(self._source.read_arm(now_ns), self.model.cycle_s)
+
+    def _report_error(self, name: str, error: ScriptError) -> None:
+        self.reports.append(ProgramError(error.line, error.column, error.text))
+        self.refusals.append(f"program {name!r}, line {error.line}: {error.words}")
 
     def upload(self, text: str) -> None:
-        """Accept a program from a script port; it replaces a running one. Ignored silently when not ready."""
+        """Accept a program from a client port; it replaces a running one. Ignored silently when not ready."""
         if self.ignore_scripts or not self.ready:
             self.counters["scripts_refused"] += 1
             return
-        self.start_program(program_of(text))
+        try:
+            self.start_program(program_of(text))
+        except ProgramRefused as refused:
+            self.counters["scripts_refused"] += 1
+            self._report_error(refused.name, refused.error)
+
+    def run_beside(self, text: str) -> None:
+        """Run a secondary program to its end at once, beside the running one; it may not take time."""
+        try:
+            program = program_of(text)
+        except ProgramRefused as refused:
+            self._report_error(refused.name, refused.error)
+            return
+        try:
+            if program.step(self, self._now_ns):
+                raise ScriptError(1, 1, "secondary_program_takes_time", "a secondary program may not take time")
+        except ScriptError as error:
+            self._report_error(program.name, error)
 
     @property
     def ready(self) -> bool:
@@ -137,6 +212,7 @@ class UrController:
             self.counters["scripts_refused"] += 1
             return
         self.program = program
+        self.reports.append(KeyReport(STARTED, program.name))
         self.runtime_state = RuntimeState.PLAYING
         self.counters["programs_started"] += 1
 
@@ -146,6 +222,8 @@ class UrController:
 
     def stop_program(self) -> None:
         """End the running program; the arm stays where it is."""
+        if self.program is not None:
+            self.reports.append(KeyReport(STOPPED, self.program.name))
         self.program = None
         self._waiting = None
         self.watchdog = None
@@ -174,10 +252,22 @@ class UrController:
         if self.robot_mode == RobotMode.IDLE:
             self._power_at = (self._now_ns + self._power_step_ns, RobotMode.RUNNING)
 
+    def power_on_and_release(self) -> None:
+        """Power on if need be and release the brakes, as `set robotmode run` does."""
+        self.power_on()
+        if self._power_at is not None:
+            self._release_next = True
+        self.release_brakes()
+
+    def set_speed(self, fraction: float) -> None:
+        """Move the speed slider, 0..1."""
+        self.speed_fraction = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else self.speed_fraction
+
     def power_off(self) -> None:
         """Engage the brakes and switch the power off, at once."""
         self.stop_program()
         self._power_at = None
+        self._release_next = False
         self.robot_mode = RobotMode.POWER_OFF
 
     def trip_protective_stop(self) -> None:

@@ -5,6 +5,7 @@ Source: Universal Robots dashboard server manual, CB3 and e-Series.
 
 from __future__ import annotations
 
+import posixpath
 import socket
 from collections.abc import Callable
 
@@ -15,11 +16,36 @@ from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.tcp import TcpClient, TcpServer
 
 DASHBOARD_PORT = 29999
+NEVER = (99, 0)
 GREETING = "Connected: Universal Robots Dashboard Server"
 TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
 _LINE_LIMIT_BYTES = 10_000
+PROGRAMS = ("/programs/other.urp", "/programs/wait_program.urp")
+INSTALLATIONS = ("/programs/default.installation",)
+FOLDER = "/programs"
+"""Relative names of programs and installations are looked for here."""
+ROLES = ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED")
+REPORTS = ("controller", "software", "system")
+
+_SINCE: dict[str, tuple[tuple[int, int], tuple[int, int]]] = {
+    "robotmode": ((1, 6), (5, 0)),
+    "safetymode": ((3, 0), (5, 0)),
+    "safetystatus": (NEVER, (5, 4)),
+    "restart safety": ((3, 7), (5, 1)),
+    "load installation": ((3, 2), (5, 0)),
+    "get serial number": ((3, 12), (5, 6)),
+    "get robot model": ((3, 12), (5, 6)),
+    "savelog": ((3, 13), (5, 8)),
+    "generate flight report": ((3, 13), (5, 8)),
+    "generate support file": ((3, 13), (5, 8)),
+    "setuserrole": ((3, 1), NEVER),
+    "getuserrole": ((3, 1), NEVER),
+    "is in remote control": (NEVER, (5, 6)),
+    "get operational mode": (NEVER, (5, 6)),
+}
+"""From which version of a CB3's PolyScope and of an e-Series' on a command is known; all others are in both."""
 
 
 class Dashboard:
@@ -29,7 +55,7 @@ class Dashboard:
         self.model = robot.model.dashboard_name
         self._robot = robot
         self._serial = robot.model.serial
-        self._programs = programs
+        self._programs = programs or PROGRAMS
         self._loaded = ""
         self._role = "NONE"
         self._answers: dict[str, Callable[[], str]] = {
@@ -54,28 +80,39 @@ class Dashboard:
             "get robot model": lambda: self.model,
             "get serial number": lambda: self._serial,
             "getuserrole": lambda: self._role,
+            "savelog": lambda: "Log saved to disk",
+            "is in remote control": lambda: "true",
+            "get operational mode": lambda: "NONE",
             "quit": lambda: "Disconnected",
             "shutdown": lambda: "Shutting down",
         }
 
+        self._with_argument: dict[str, Callable[[str], str]] = {
+            "load installation": self._load_installation,
+            "load": self._load,
+            "popup": lambda _text: "showing popup",
+            "addtolog": lambda _text: "Added log message",
+            "setuserrole": self._set_role,
+            "generate flight report": self._flight_report,
+            "generate support file": lambda folder: f"Completed successfully: {folder}",
+        }
+
     def answer(self, line: str) -> str:
         """Return the reply to one command."""
-        known = self._answers.get(line.lower())
-        if known is not None:
-            return known()
-        word, _, rest = line.partition(" ")
-        if word.lower() == "load" and rest:
-            return self._load(rest)
-        if word.lower() == "popup" and rest:
-            return "showing popup"
-        if word == "addToLog" and rest:
-            return "Added log message"
-        if word == "setUserRole" and rest:
-            self._role = rest
-            return f"Setting user role: {rest}"
-        if line == "is in remote control" and self._robot.version[0] >= 5:
-            return "true"
+        if line.lower() in self._answers and self._knows(line.lower()):
+            return self._answers[line.lower()]()
+        for command, reply in self._with_argument.items():
+            argument = line[len(command) + 1 :].strip()
+            if line.lower().startswith(f"{command} ") and argument and self._knows(command):
+                return reply(argument)
+            if line.lower() == command == "generate flight report" and self._knows(command):
+                return reply("")
         return f"could not understand: '{line}'"
+
+    def _knows(self, command: str) -> bool:
+        cb3, e_series = _SINCE.get(command, ((0, 0), (0, 0)))
+        version = self._robot.version
+        return version[:2] >= (e_series if version[0] >= 5 else cb3)
 
     def _version(self) -> str:
         version = ".".join(map(str, self._robot.version))
@@ -85,7 +122,7 @@ class Dashboard:
         state = "PAUSED" if self._robot.runtime_state == RuntimeState.PAUSED else "STOPPED"
         if self._robot.runtime_state == RuntimeState.PLAYING:
             state = "PLAYING"
-        return f"{state} {self._loaded or '<unnamed>'}"
+        return f"{state} {posixpath.basename(self._loaded) or '<unnamed>'}"
 
     def _stop(self) -> str:
         self._robot.stop_program()
@@ -130,11 +167,26 @@ class Dashboard:
         self._robot.robot_mode = RobotMode.POWER_OFF
         return "Restarting safety"
 
-    def _load(self, path: str) -> str:
+    def _load(self, name: str) -> str:
+        path = posixpath.join(FOLDER, name)
         if path not in self._programs:
-            return f"File not found: {path}"
+            return f"File not found: {name}"
+        self._robot.stop_program()
         self._loaded = path
         return f"Loading program: {path}"
+
+    def _load_installation(self, name: str) -> str:
+        path = posixpath.join(FOLDER, name)
+        return f"Loading installation: {path}" if path in INSTALLATIONS else f"File not found: {name}"
+
+    def _set_role(self, role: str) -> str:
+        if role.upper() not in ROLES:
+            return f"Failed setting user role: {role}"
+        self._role = role.upper()
+        return f"Setting user role: {self._role}"
+
+    def _flight_report(self, kind: str) -> str:
+        return f"Flight Report generated with id: {kind or REPORTS[-1]}"
 
 
 class DashboardClient(TcpClient):

@@ -1,20 +1,23 @@
 """A UR controller on the wire (CB3 with PolyScope 3.15, e-Series with 5.12), on one loopback address.
 
-It serves RTDE, script upload and dashboard. One thread, one event loop, shared with whatever else runs in it. Joints
-come from the world; motion by a program or a fault is added to them (`motion`) and does not feed back into the world.
+It serves RTDE, the primary, secondary and real-time ports, and the dashboard. One thread, one event loop, shared with
+whatever else runs in it. Joints come from the world; motion by a program or a fault is added to them (`motion`) and
+does not feed back into the world.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
+from sim_backend.ur10.client_ports.servers import ClientPorts
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import Dashboard, DashboardServer
 from sim_backend.ur10.faults import UrFaults
 from sim_backend.ur10.models import UR10, UrModel, Version
 from sim_backend.ur10.request_log import RequestLog
-from sim_backend.ur10.rtde_server import RtdeServer
-from sim_backend.ur10.script_server import script_servers
+from sim_backend.ur10.rtde.server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
 from sim_backend.world.plant import ArmSource, FtSource
 
@@ -27,9 +30,9 @@ class UrEmulator(UrFaults):
     """An emulated UR arm at `host` (127.x.y.z), serving as soon as its loop runs.
 
     `rate_hz` is the control cycle measured by an outside clock (a real one is never exactly 125 or 500 Hz; None: as
-    one is); `phase` (0..1) shifts its grid; `version` is another PolyScope than the model's;
-    `wrench` feeds the sensor at the flange, which only an e-Series arm has. The fault methods are
-    those of `UrFaults`; `requests` and `counters` record what happened.
+    one is); `phase` (0..1) shifts its grid; `version` is another PolyScope than the model's; `warn` is told in words
+    what a program wanted and this controller does not do; `wrench` feeds the sensor at the flange, which only an
+    e-Series arm has. The fault methods are those of `UrFaults`; `requests` and `counters` record what happened.
     Raises EnvironmentFault when a port is taken, UsageError for an address that is not loopback.
     """
 
@@ -43,8 +46,9 @@ class UrEmulator(UrFaults):
         rate_hz: float | None = None,
         phase: float = 0.21,
         version: Version | None = None,
-        programs: tuple[str, ...] = ("/programs/other.urp",),
+        programs: tuple[str, ...] = (),
         power_step_s: float = 1.0,
+        warn: Callable[[str], None] = lambda _words: None,
         wrench: FtSource | None = None,
     ) -> None:
         self.host = host
@@ -52,6 +56,7 @@ class UrEmulator(UrFaults):
         self.controller = UrController(source, model, monotonic_ns(), power_step_s, wrench)
         self.controller.version = version or model.version
         self._loop = loop
+        self._warn = warn
         self._period_ns = NS_PER_S / (rate_hz or model.rate_hz * REAL_CLOCK)
         self._start_ns = monotonic_ns() + round(phase * self._period_ns)
         self._cycle = 0
@@ -64,7 +69,7 @@ class UrEmulator(UrFaults):
             opened.append(self.rtde)
             self.dashboard = DashboardServer(loop, host, Dashboard(self.controller, programs), self.requests)
             opened.append(self.dashboard)
-            self.scripts = script_servers(loop, host, self.controller, self.requests)
+            self.ports = ClientPorts(loop, host, self.controller, self.requests)
         except BaseException:
             for server in opened:
                 server.close()
@@ -80,7 +85,8 @@ class UrEmulator(UrFaults):
             "rtde_clients": len(self.rtde.clients),
             "rtde_accepted": self.rtde.accepted,
             "dashboard_accepted": self.dashboard.accepted,
-            "script_accepted": sum(server.accepted for server in self.scripts),
+            **self.ports.counters,
+            "script_accepted": sum(server.accepted for server in self.ports.servers),
             "input_frames": self.requests.input_frames,
             "bad_frames": self.requests.bad_frames,
             "late_cycles": self.late_cycles,
@@ -110,5 +116,8 @@ class UrEmulator(UrFaults):
             self._cycle += int(late_ns / self._period_ns)
         self.controller.cycle(grid_ns)
         self.rtde.send_data()
+        self.ports.send_cycle()
+        while self.controller.refusals:
+            self._warn(self.controller.refusals.popleft())
         if self._timer is not None:
             self._schedule()

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sim_backend.ur10.client_ports.servers import ClientPorts
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import DashboardServer
 from sim_backend.ur10.modes import RobotMode, SafetyMode, SafetyStatus
 from sim_backend.ur10.registers import REGISTERS
-from sim_backend.ur10.rtde_server import RtdeServer
+from sim_backend.ur10.rtde.server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
 
 
@@ -18,7 +19,7 @@ class UrFaults:
     controller: UrController
     rtde: RtdeServer
     dashboard: DashboardServer
-    scripts: list[TcpServer]
+    ports: ClientPorts
 
     def set_robot_mode(self, mode: int) -> None:
         """Set the robot mode (see `RobotMode`); below RUNNING the program ends."""
@@ -172,4 +173,4 @@ class UrFaults:
         self.rtde.close_clients()
 
     def _servers(self) -> list[TcpServer]:
-        return [self.rtde, self.dashboard, *self.scripts]
+        return [self.rtde, self.dashboard, *self.ports.servers]

@@ -13,12 +13,13 @@ BITS = 128
 
 
 class Registers:
-    """Integer and double registers 0..47, in and out, when each input was last written, and input bits 0..127."""
+    """Integer and double registers 0..47, in and out, when each input was last written, and bits 0..127."""
 
     def __init__(self) -> None:
         self.int_in = [0] * REGISTERS
         self.double_in = [0.0] * REGISTERS
         self.bits_in = [False] * BITS
+        self.bits_out = [False] * BITS
         self.int_out = [0] * REGISTERS
         self.double_out = [0.0] * REGISTERS
         self.int_written_ns = [0] * REGISTERS

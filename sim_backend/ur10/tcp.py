@@ -101,12 +101,24 @@ class TcpClient(ABC):
         else:
             self.close()
 
+    def _hear_out(self) -> None:
+        """Process what a client sent before it went: one that reads nothing ends its connection with a reset."""
+        while self.open:
+            try:
+                data = self._sock.recv(_READ_BYTES)
+            except OSError:
+                return
+            if not data:
+                return
+            self.on_bytes(data)
+
     def _flush(self) -> None:
         try:
             sent = self._sock.send(self._queue)
         except BlockingIOError:
             sent = 0
         except OSError:
+            self._hear_out()
             self.close()
             return
         del self._queue[:sent]

@@ -4,6 +4,10 @@ import socket
 
 import pytest
 
+from sim_backend.ur10.controller import UrController
+from sim_backend.ur10.dashboard import Dashboard
+from sim_backend.ur10.models import UR10
+from sim_backend.ur10.standalone import StillArm
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
 
@@ -61,6 +65,15 @@ def test_greeting(dashboard) -> None:
         ("popup hello", "showing popup"),
         ("addToLog hello", "Added log message"),
         ("load /programs/none.urp", "File not found: /programs/none.urp"),
+        ("load none.urp", "File not found: none.urp"),
+        ("load installation default.installation", "Loading installation: /programs/default.installation"),
+        ("load installation none.installation", "File not found: none.installation"),
+        ("saveLog", "Log saved to disk"),
+        ("generate flight report system", "Flight Report generated with id: system"),
+        ("generate flight report", "Flight Report generated with id: system"),
+        ("generate support file /tmp", "Completed successfully: /tmp"),
+        ("safetystatus", "could not understand: 'safetystatus'"),
+        ("setUserRole astronaut", "Failed setting user role: astronaut"),
         ("getUserRole", "NONE"),
         ("is in remote control", "could not understand: 'is in remote control'"),
         ("make coffee", "could not understand: 'make coffee'"),
@@ -75,17 +88,52 @@ def test_quit_says_goodbye_and_closes(dashboard) -> None:
     assert dashboard.file.readline() == b""
 
 
-def test_a_loaded_program_plays_pauses_and_stops(dashboard) -> None:
-    path = "/programs/other.urp"
-    assert dashboard.ask(f"load {path}") == f"Loading program: {path}\n"
+@pytest.mark.parametrize("name", ["/programs/other.urp", "wait_program.urp"])
+def test_a_loaded_program_plays_pauses_and_stops(dashboard, name: str) -> None:
+    """`programState` gives the file name alone: UR's own client waits for it."""
+    path, file = f"/programs/{name.rpartition('/')[2]}", name.rpartition("/")[2]
+    assert dashboard.ask(f"load {name}") == f"Loading program: {path}\n"
+    assert dashboard.ask("programState") == f"STOPPED {file}\n"
     assert dashboard.ask("get loaded program") == f"Loaded program: {path}\n"
+    assert dashboard.ask("isProgramSaved").startswith("true /programs/")
     assert dashboard.ask("play") == "Starting program\n"
-    wait_until(lambda: dashboard.ask("programState") == f"PLAYING {path}\n", "it plays")
+    wait_until(lambda: dashboard.ask("programState") == f"PLAYING {file}\n", "it plays")
     assert dashboard.ask("running") == "Program running: true\n"
     assert dashboard.ask("pause") == "Pausing program\n"
-    assert dashboard.ask("programState") == f"PAUSED {path}\n"
+    assert dashboard.ask("programState") == f"PAUSED {file}\n"
     assert dashboard.ask("stop") == "Stopped\n"
-    assert dashboard.ask("programState") == f"STOPPED {path}\n"
+    assert dashboard.ask("programState") == f"STOPPED {file}\n"
+
+
+@pytest.mark.parametrize("role", ["PROGRAMMER", "OPERATOR", "LOCKED", "RESTRICTED", "NONE"])
+def test_the_roles_that_a_cb3_has(dashboard, role: str) -> None:
+    assert dashboard.ask(f"setUserRole {role}") == f"Setting user role: {role}\n"
+    assert dashboard.ask("setUserRole pilot") == "Failed setting user role: pilot\n"
+    assert dashboard.ask("getUserRole") == f"{role}\n"
+
+
+SINCE = [
+    ("safetystatus", (3, 15), (5, 3), (5, 4)),
+    ("getUserRole", (5, 12), (3, 0), (3, 1)),
+    ("saveLog", (5, 7), (3, 12), (3, 13)),
+    ("generate support file .", (5, 7), (3, 12), (5, 8)),
+    ("get robot model", (5, 5), (3, 11), (3, 12)),
+    ("restart safety", (5, 0), (3, 6), (3, 7)),
+    ("is in remote control", (3, 15), (5, 5), (5, 6)),
+]
+"""Command, two versions that do not know it and one that does: the table of UR's own client."""
+
+
+@pytest.mark.parametrize(("command", "never", "before", "since"), SINCE)
+def test_each_version_knows_its_commands(command: str, never, before, since) -> None:
+    controller = UrController(StillArm(), UR10, 0)
+
+    def answer(version: tuple[int, int]) -> str:
+        controller.version = (*version, 0, 0)
+        return Dashboard(controller, ()).answer(command)
+
+    unknown = f"could not understand: '{command}'"
+    assert [answer(version) == unknown for version in (never, before, since)] == [True, True, False]
 
 
 def test_power_off_on_and_brakes(dashboard) -> None:

@@ -51,7 +51,7 @@ def test_a_program_plays_until_stopped(robot, port: int) -> None:
 
 def test_nothing_starts_before_the_closing_end(robot) -> None:
     with socket.create_connection((robot.host, 30002), timeout=3) as connection:
-        part = b"def hello():\n  if True:\n    sync()\n  end\n"
+        part = b"def hello():\n  if True:\n    sleep(60)\n  end\n"
         connection.sendall(part)
         wait_until(lambda: robot.get("requests.script_bytes") == len(part), "the first part arrived")
         assert list(robot.get("requests.scripts")) == []
@@ -72,7 +72,7 @@ def test_an_indented_program_is_one_program(robot) -> None:
 
 
 def test_a_secondary_program_leaves_the_running_one_alone(robot) -> None:
-    upload(robot.host, "def first():\n  sync()\nend\n")
+    upload(robot.host, "def first():\n  sleep(60)\nend\n")
     wait_until(lambda: runtime(robot) == PLAYING, "the first plays")
     upload(robot.host, "sec beside():\n  textmsg(1)\nend\n", 30002)
     wait_until(lambda: len(robot.get("requests.scripts")) == 2, "the second arrived")
@@ -81,9 +81,9 @@ def test_a_secondary_program_leaves_the_running_one_alone(robot) -> None:
 
 
 def test_a_new_program_replaces_the_running_one(robot) -> None:
-    upload(robot.host, "def first():\n  sync()\nend\n")
+    upload(robot.host, "def first():\n  sleep(60)\nend\n")
     wait_until(lambda: runtime(robot) == PLAYING, "the first plays")
-    upload(robot.host, "def second():\n  sync()\nend\n")
+    upload(robot.host, "def second():\n  sleep(60)\nend\n")
     wait_until(lambda: robot.get("counters.programs_started") == 2, "the second plays")
     assert robot.get("controller.program.name") == "second"
 
@@ -97,7 +97,7 @@ def test_a_single_line_runs_and_ends(robot) -> None:
 @pytest.mark.parametrize("fault", [("set_robot_mode", 5), ("protective_stop",), ("ignore_scripts",)])
 def test_programs_are_refused_without_a_word(robot, fault) -> None:
     robot.call(*fault)
-    upload(robot.host, "def first():\n  sync()\nend\n")
+    upload(robot.host, "def first():\n  sleep(60)\nend\n")
     wait_until(lambda: robot.get("counters.scripts_refused") == 1, "it is refused")
     assert runtime(robot) == STOPPED
 
@@ -105,7 +105,7 @@ def test_programs_are_refused_without_a_word(robot, fault) -> None:
 def test_a_stop_before_the_start_refuses_the_program(robot) -> None:
     """The controller takes a moment between upload and start."""
     with socket.create_connection((robot.host, 30003), timeout=3) as connection:
-        connection.sendall(b"def first():\n  sync()\nend\n")
+        connection.sendall(b"def first():\n  sleep(60)\nend\n")
         wait_until(lambda: robot.get("controller._waiting") is not None, "it is about to start")
         robot.call("protective_stop")
     wait_until(lambda: robot.get("counters.scripts_refused") == 1, "it is refused")
@@ -187,6 +187,7 @@ def test_servo_target_is_followed_and_held_without_further_commands(robot, regis
 @pytest.mark.parametrize("number", [MOVE_J, SPEED_J, SERVO_J])
 @pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e308, -1e308])
 def test_a_joint_stays_within_its_range_whatever_is_commanded(robot, number: int, value: float) -> None:
+    """A move is cut to the range; a speed or a target to be followed at once is beyond what a joint does."""
     upload(robot.host, control_script(0))
     wait_until(lambda: runtime(robot) == PLAYING, "the control script plays")
     registers = Registers(robot.host, 0)
@@ -194,7 +195,8 @@ def test_a_joint_stays_within_its_range_whatever_is_commanded(robot, number: int
     wait_cycles(robot, 5)
     registers.command(0)
     assert all(abs(q) <= 2 * math.pi for q in robot.get("controller.motion.actual"))
-    assert runtime(robot) == PLAYING
+    assert runtime(robot) == (PLAYING if number == MOVE_J else PAUSED)
+    assert robot.get("controller.safety_mode") == (1 if number == MOVE_J else 3), "a protective stop"
     registers.close()
 
 

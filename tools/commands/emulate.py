@@ -26,7 +26,8 @@ from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.ft300.standalone import ConstantWrench, parse_wrench
 from sim_backend.ridgeback.standalone import standalone_emulator
 from sim_backend.ur10.emulator import UrEmulator
-from sim_backend.ur10.models import BY_NAME
+from sim_backend.ur10.modelled import MODELLED
+from sim_backend.ur10.models import BY_NAME, Version
 from sim_backend.ur10.standalone import StillArm
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
@@ -67,6 +68,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ur10 = devices.add_parser("ur10", help="the same as `ur --model ur10`")
     ur10.set_defaults(model="ur10", wrench=None)
     for arm in (ur, ur10):
+        arm.description = MODELLED
+        arm.add_argument(
+            "--polyscope", type=_polyscope, metavar="VERSION", help="another software than the model's, as in 3.4"
+        )
         arm.add_argument(
             "--host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST}); one robot per address"
         )
@@ -153,9 +158,15 @@ def _open_ur(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitS
         raise UsageError(
             f"a {model.name} has no force sensor", where="--wrench", do="Give an e-Series arm: --model ur10e"
         )
+    version = args.polyscope
+    if version is not None and (version[0] >= 5) != (model.generation == "e-Series"):
+        raise UsageError(
+            f"a {model.name} has no PolyScope {version[0]}", where="--polyscope",
+            do="Give 3.0 or later for a CB3 arm, 5.0 or later for an e-Series one",
+        )  # fmt: skip
     wrench = None if model.force_range_N is None else ConstantWrench(parse_wrench(args.wrench or "0,0,0,0,0,0"))
     with _elsewhere("--host 127.x.y.z"):
-        emulator = UrEmulator(loop, StillArm(), host=args.host, model=model, wrench=wrench)
+        emulator = UrEmulator(loop, StillArm(), host=args.host, model=model, version=version, wrench=wrench, warn=_warn)
     opened.callback(emulator.close)
     return [emulator]
 
@@ -173,7 +184,7 @@ def _open_all(loop: EventLoop, args: argparse.Namespace, opened: contextlib.Exit
     emulators: list[Emulator] = []
     for open_device, options in (
         (lambda: open_ft300(loop, world, rig), ""),
-        (lambda: open_ur10(loop, world, rig, (args.arm_host,)), "--arm-host 127.x.y.z"),
+        (lambda: open_ur10(loop, world, rig, (args.arm_host,), _warn), "--arm-host 127.x.y.z"),
         (
             lambda: open_ridgeback(loop, world, rig, args.base_host, args.base_port),
             "--base-host 127.x.y.z or --base-port",
@@ -209,6 +220,19 @@ def _loopback(text: str) -> str:
             f"{text!r} is not a loopback address", where="command line", do="The emulators listen on 127.x.y.z only"
         )
     return text
+
+
+def _polyscope(text: str) -> Version:
+    """Return the version in `3.4` or `5.12.1`. Raises UsageError for anything else."""
+    parts = text.split(".")
+    if not 2 <= len(parts) <= 4 or not all(part.isascii() and part.isdigit() for part in parts) or parts[0] not in "35":
+        raise UsageError(f"{text!r} is no PolyScope version", where="command line", do="Give one as in 3.4 or 5.12.1")
+    major, minor, bugfix, build = (*map(int, parts), 0, 0, 0)[:4]
+    return (major, minor, bugfix, build)
+
+
+def _warn(words: str) -> None:
+    tell(printable(f"push: {words}"))
 
 
 def _port(text: str) -> int:

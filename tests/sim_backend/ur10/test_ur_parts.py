@@ -14,12 +14,13 @@ from robot_io.messages import LinkState
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.emulator import UrEmulator
-from sim_backend.ur10.kinematics import flange_pose, rotation_vector
 from sim_backend.ur10.models import BY_NAME, UR10
 from sim_backend.ur10.modes import RobotMode, SafetyMode, joint_mode, robot_status_bits, safety_bits
+from sim_backend.ur10.motion.kinematics import tool_pose
+from sim_backend.ur10.motion.transforms import rotation_vector
 from sim_backend.ur10.registers import Registers, Watchdog
 from sim_backend.ur10.request_log import RequestLog
-from sim_backend.ur10.rtde_server import RtdeServer
+from sim_backend.ur10.rtde.server import RtdeServer
 from sim_backend.ur10.standalone import HELD_POSE_RAD, StillArm
 from sim_backend.world.plant import ArmTruth
 from tests.wire.ur_process import fresh_address
@@ -34,18 +35,18 @@ class MovingArm:
 
 def test_flange_pose_of_the_outstretched_arm() -> None:
     """All joints zero: along -x by both links, out to -y by the wrist, d1 - d5 high; half of it from UR's table."""
-    x, y, z, rx, ry, rz = flange_pose((0.0,) * 6, UR10)
+    x, y, z, rx, ry, rz = tool_pose((0.0,) * 6, UR10)
     assert (x, y, z) == pytest.approx((-1.1843, -0.256141, 0.0116))
     assert (rx, ry, rz) == pytest.approx((math.pi / 2, 0.0, 0.0))
 
 
 def test_flange_pose_turns_with_the_base_joint() -> None:
-    x, y, z, *_ = flange_pose((math.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0), UR10)
+    x, y, z, *_ = tool_pose((math.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0), UR10)
     assert (x, y, z) == pytest.approx((0.256141, -1.1843, 0.0116))
 
 
 def test_flange_pose_straight_up() -> None:
-    x, y, z, *_ = flange_pose((0.0, -math.pi / 2, 0.0, -math.pi / 2, 0.0, 0.0), UR10)
+    x, y, z, *_ = tool_pose((0.0, -math.pi / 2, 0.0, -math.pi / 2, 0.0, 0.0), UR10)
     assert (x, y, z) == pytest.approx((0.0, -0.256141, 0.1273 + 0.612 + 0.5723 + 0.1157))
 
 
@@ -62,7 +63,7 @@ def test_flange_pose_straight_up() -> None:
 )
 def test_every_model_outstretched(name: str, reach_m: float, out_m: float, up_m: float) -> None:
     """From UR's table: both links, then d4 + d6 to the side, d1 - d5 high."""
-    x, y, z, *_ = flange_pose((0.0,) * 6, BY_NAME[name])
+    x, y, z, *_ = tool_pose((0.0,) * 6, BY_NAME[name])
     assert (x, y, z) == pytest.approx((-reach_m, -out_m, up_m))
 
 

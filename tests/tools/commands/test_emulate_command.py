@@ -278,3 +278,21 @@ def test_people_get_a_line_they_can_read():
             assert read_line(child).decode().split()[0] == "ft300"
         finally:
             child.kill()
+
+
+def test_a_program_that_needs_an_interpreter_is_one_line():
+    """On stderr, beside the error that the client gets on the primary port."""
+    with emulate("ur10", "--host", "127.0.42.21", "--polyscope", "3.4") as (child, _):
+        with socket.create_connection(("127.0.42.21", 30002), timeout=3) as port:
+            port.sendall(b"def looks():\n  thread watch():\n    sync()\n  end\nend\n")
+            words = child.stderr.readline()
+            assert b"program 'looks', line 2: `thread` needs a URScript interpreter" in words
+            head = port.recv(60, socket.MSG_WAITALL)
+        assert head[:4] == bytes.fromhex("0000002e"), "the version message"
+        assert head[25:27] == bytes([3, 4])
+
+
+@pytest.mark.parametrize("version", ["4.1", "5.12", "3", "3.x"])
+def test_a_polyscope_that_a_ur10_cannot_have_is_refused(version, capsys):
+    assert cli.main(["emulate", "ur10", "--host", "127.0.42.22", "--polyscope", version]) == 2
+    assert "PolyScope" in capsys.readouterr().err

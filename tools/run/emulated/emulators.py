@@ -45,10 +45,17 @@ def open_ft300(loop: EventLoop, world: World, rig: RigConfig) -> Ft300Emulator:
     return emulator
 
 
-def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, ...] = ARM_HOSTS) -> UrEmulator:
+def open_ur10(
+    loop: EventLoop,
+    world: World,
+    rig: RigConfig,
+    hosts: tuple[str, ...] = ARM_HOSTS,
+    warn: Callable[[str], None] = lambda _words: None,
+) -> UrEmulator:
     """Open the world's UR on the first loopback address whose ports are free. Raises EnvironmentFault if none is.
 
-    Its own sensor feels the world where it is the rig's sensor.
+    Its own sensor feels the world where it is the rig's sensor. `warn` is told what a client's program wanted and is
+    not done.
     """
     model = BY_NAME[rig.world.arm_model.lower()]
     wrench = world if rig.ft.kind == TOOL_FORCE else None
@@ -62,6 +69,7 @@ def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, .
                 rate_hz=rig.world.arm_cycle_hz,
                 phase=rig.world.arm_phase,
                 wrench=wrench,
+                warn=warn,
             )
         except EnvironmentFault:
             if len(hosts) == 1:

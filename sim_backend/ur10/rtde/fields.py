@@ -11,9 +11,9 @@ from collections.abc import Callable
 import msgspec
 
 from sim_backend.ur10.controller import UrController
-from sim_backend.ur10.kinematics import flange_pose
 from sim_backend.ur10.models import Version
 from sim_backend.ur10.modes import RobotMode, joint_mode, robot_status_bits, safety_bits
+from sim_backend.ur10.outputs import CONFIGURABLE, STANDARD, TOOL
 from sim_backend.ur10.registers import REGISTERS
 
 Value = int | float | bool
@@ -71,7 +71,7 @@ def _wrench(robot: UrController) -> Values:
 
 
 def _pose(robot: UrController) -> Values:
-    return flange_pose(robot.motion.actual, robot.model)
+    return robot.tcp_pose
 
 
 def _joint_modes(robot: UrController) -> Values:
@@ -98,10 +98,10 @@ _OUTPUTS: dict[str, Output] = {
     "actual_current": _constant("VECTOR6D", 0.05, 4.6, 2.4, 0.4, 0.05, 0.02),
     "joint_control_output": _constant("VECTOR6D", 0.05, 4.6, 2.4, 0.4, 0.05, 0.02),
     "actual_TCP_pose": Output("VECTOR6D", _pose),
-    "actual_TCP_speed": _zeros("VECTOR6D"),
+    "actual_TCP_speed": Output("VECTOR6D", lambda r: r.tcp_speed),
     "actual_TCP_force": Output("VECTOR6D", _wrench),
     "target_TCP_pose": Output("VECTOR6D", _pose),
-    "target_TCP_speed": _zeros("VECTOR6D"),
+    "target_TCP_speed": Output("VECTOR6D", lambda r: r.tcp_speed),
     "actual_digital_input_bits": _constant("UINT64", 0),
     "joint_temperatures": _constant("VECTOR6D", 31.0, 32.0, 32.0, 34.0, 35.0, 35.0),
     "actual_execution_time": _constant("DOUBLE", 0.4),
@@ -110,24 +110,24 @@ _OUTPUTS: dict[str, Output] = {
     "safety_mode": Output("INT32", lambda r: (int(r.safety_mode),)),
     "safety_status": Output("INT32", lambda r: (int(r.safety_status),)),
     "actual_tool_accelerometer": _constant("VECTOR3D", 0.0, -9.8, 0.0),
-    "speed_scaling": _constant("DOUBLE", 1.0),
-    "target_speed_fraction": _constant("DOUBLE", 1.0),
+    "speed_scaling": Output("DOUBLE", lambda r: (r.speed_scaling,)),
+    "target_speed_fraction": Output("DOUBLE", lambda r: (r.speed_fraction,)),
     "actual_momentum": _constant("DOUBLE", 0.0),
     "actual_main_voltage": _constant("DOUBLE", 48.0),
     "actual_robot_voltage": Output("DOUBLE", _arm_voltage),
     "actual_robot_current": _constant("DOUBLE", 0.8),
     "actual_joint_voltage": _constant("VECTOR6D", *(47.5,) * 6),
-    "actual_digital_output_bits": _constant("UINT64", 0),
+    "actual_digital_output_bits": Output("UINT64", lambda r: (r.io.digital_out,)),
     "runtime_state": Output("UINT32", lambda r: (int(r.runtime_state),)),
     "elbow_position": _zeros("VECTOR3D"),
     "elbow_velocity": _zeros("VECTOR3D"),
     "robot_status_bits": Output("UINT32", _robot_status),
     "safety_status_bits": Output("UINT32", lambda r: (safety_bits(r.safety_mode),)),
-    "analog_io_types": _constant("UINT32", 0),
+    "analog_io_types": Output("UINT32", lambda r: (r.io.analog_domain[0] << 2 | r.io.analog_domain[1] << 3,)),
     "standard_analog_input0": _constant("DOUBLE", 0.0),
     "standard_analog_input1": _constant("DOUBLE", 0.0),
-    "standard_analog_output0": _constant("DOUBLE", 0.0),
-    "standard_analog_output1": _constant("DOUBLE", 0.0),
+    "standard_analog_output0": Output("DOUBLE", lambda r: (r.io.analog_values[0],)),
+    "standard_analog_output1": Output("DOUBLE", lambda r: (r.io.analog_values[1],)),
     "io_current": _constant("DOUBLE", 0.0),
     "euromap67_input_bits": _constant("UINT32", 0),
     "euromap67_output_bits": _constant("UINT32", 0),
@@ -146,16 +146,41 @@ _OUTPUTS: dict[str, Output] = {
     "payload": Output("DOUBLE", lambda r: (r.payload_kg,)),
     "payload_cog": Output("VECTOR3D", lambda r: r.payload_cog_m),
     "payload_inertia": _zeros("VECTOR6D"),
-    "output_bit_registers0_to_31": _constant("UINT32", 0),
-    "output_bit_registers32_to_63": _constant("UINT32", 0),
 }
 
 _SINCE: dict[str, Version] = {"ft_raw_wrench": (5, 9, 0, 0)}
 """From which version on there is an output that older ones do not have."""
 
 
-def _discard(_robot: UrController, _values: Values, _now_ns: int) -> None:
-    """Accept and ignore a value that has no effect on this robot."""
+def _masked(name: str, type_name: str, use: Callable[[UrController], None]) -> Input:
+    """Return an input that counts together with another of the same packet, whichever comes first."""
+
+    def write(robot: UrController, values: Values, _now_ns: int) -> None:
+        robot.masked_inputs.put(name, float(values[0]))
+        use(robot)
+
+    return Input(type_name, write)
+
+
+def _use_speed_slider(robot: UrController) -> None:
+    if robot.masked_inputs.get("speed_slider_mask"):
+        robot.set_speed(robot.masked_inputs.get("speed_slider_fraction"))
+
+
+def _use_digital(kind: str, first: int) -> Callable[[UrController], None]:
+    def use(robot: UrController) -> None:
+        inputs = robot.masked_inputs
+        robot.io.set_digital(first, int(inputs.get(f"{kind}_mask")), int(inputs.get(kind)))
+
+    return use
+
+
+def _use_analog(robot: UrController) -> None:
+    inputs = robot.masked_inputs
+    for i in range(2):
+        if int(inputs.get("standard_analog_output_mask")) >> i & 1:
+            domain = int(inputs.get("standard_analog_output_type")) >> i & 1
+            robot.io.set_analog(i, domain, inputs.get(f"standard_analog_output_{i}"))
 
 
 def _set_wrench(robot: UrController, values: Values, _now_ns: int) -> None:
@@ -164,20 +189,26 @@ def _set_wrench(robot: UrController, values: Values, _now_ns: int) -> None:
 
 
 _INPUTS: dict[str, Input] = {
-    "speed_slider_mask": Input("UINT32", _discard),
-    "speed_slider_fraction": Input("DOUBLE", _discard),
-    "standard_digital_output_mask": Input("UINT8", _discard),
-    "standard_digital_output": Input("UINT8", _discard),
-    "configurable_digital_output_mask": Input("UINT8", _discard),
-    "configurable_digital_output": Input("UINT8", _discard),
-    "tool_digital_output_mask": Input("UINT8", _discard),
-    "tool_digital_output": Input("UINT8", _discard),
-    "standard_analog_output_mask": Input("UINT8", _discard),
-    "standard_analog_output_type": Input("UINT8", _discard),
-    "standard_analog_output_0": Input("DOUBLE", _discard),
-    "standard_analog_output_1": Input("DOUBLE", _discard),
+    "speed_slider_mask": _masked("speed_slider_mask", "UINT32", _use_speed_slider),
+    "speed_slider_fraction": _masked("speed_slider_fraction", "DOUBLE", _use_speed_slider),
     "external_force_torque": Input("VECTOR6D", _set_wrench),
 }
+
+
+for _kind, _first in (
+    ("standard_digital_output", STANDARD),
+    ("configurable_digital_output", CONFIGURABLE),
+    ("tool_digital_output", TOOL),
+):
+    for _name in (f"{_kind}_mask", _kind):
+        _INPUTS[_name] = _masked(_name, "UINT8", _use_digital(_kind, _first))
+for _name, _type in (
+    ("standard_analog_output_mask", "UINT8"),
+    ("standard_analog_output_type", "UINT8"),
+    ("standard_analog_output_0", "DOUBLE"),
+    ("standard_analog_output_1", "DOUBLE"),
+):
+    _INPUTS[_name] = _masked(_name, _type, _use_analog)
 
 
 def _add_registers(i: int) -> None:
@@ -196,16 +227,19 @@ def _add_registers(i: int) -> None:
 
 
 def _add_bits(name: str, type_name: str, first: int, count: int) -> None:
-    """Add the input bits first..first+count-1 as one number."""
+    """Add the bits first..first+count-1 as one number: an input that can be read back, and the output like it."""
+    places = slice(first, first + count)
 
     def write(robot: UrController, values: Values, _now_ns: int) -> None:
-        robot.registers.bits_in[first : first + count] = [bool(int(values[0]) >> i & 1) for i in range(count)]
+        robot.registers.bits_in[places] = [bool(int(values[0]) >> i & 1) for i in range(count)]
 
-    def read(robot: UrController) -> Values:
-        return (sum(bit << i for i, bit in enumerate(robot.registers.bits_in[first : first + count])),)
-
-    _OUTPUTS[name] = Output(type_name, read)
     _INPUTS[name] = Input(type_name, write)
+    _OUTPUTS[name] = Output(type_name, lambda r: (_as_number(r.registers.bits_in[places]),))
+    _OUTPUTS[name.replace("input", "output")] = Output(type_name, lambda r: (_as_number(r.registers.bits_out[places]),))
+
+
+def _as_number(bits: list[bool]) -> int:
+    return sum(bit << i for i, bit in enumerate(bits))
 
 
 _add_bits("input_bit_registers0_to_31", "UINT32", 0, 32)
@@ -213,5 +247,4 @@ _add_bits("input_bit_registers32_to_63", "UINT32", 32, 32)
 for _index in range(REGISTERS):
     _add_registers(_index)
 for _index in range(64, 128):
-    _OUTPUTS[f"output_bit_register_{_index}"] = _constant("BOOL", False)
     _add_bits(f"input_bit_register_{_index}", "BOOL", _index, 1)

@@ -12,8 +12,8 @@ import struct
 from robot_io.clock import monotonic_ns
 from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ur10.controller import UrController
-from sim_backend.ur10.fields import WIRE_FORMAT, Input, Output, Values, input_field, output_field
 from sim_backend.ur10.request_log import RequestLog
+from sim_backend.ur10.rtde.fields import WIRE_FORMAT, Input, Output, Values, input_field, output_field
 from sim_backend.ur10.tcp import TcpClient, TcpServer
 
 RTDE_PORT = 30004
