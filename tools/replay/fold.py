@@ -14,6 +14,7 @@ import msgspec
 
 from robot_io.log.logged_type import LoggedType
 from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
+from robot_io.rig.config import RigConfig
 from robot_io.tick import TICK_CDR, ControlTick, TickState
 from tools.log.derivation import WORLD_TOPIC
 from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplay, BaseInputsReplayer
@@ -23,6 +24,7 @@ from tools.replay.difference import Difference, difference
 from tools.replay.law import law_of, with_law_source
 from tools.replay.verified_log import VerifiedLog
 from tools.replay.world import PREFIX, WorldReplay, WorldReplayer, WorldTypes
+from tools.run.facts.code_facts import ENGINE_FACT, engine_facts
 from tools.run.facts.run_facts import level_of
 from tools.run.tick_core import TickCore
 
@@ -102,6 +104,7 @@ def replay(path: Path, *, tolerance: float | None = None, law: str = "") -> Repl
         (
             *_notes(log, ticks.last),
             *_world_notes(world, world_replay, types, level_of(rig)),
+            *_engine_notes(log.facts, rig),
             *_derived_notes(derived_replay),
         ),
         made_by,
@@ -123,9 +126,16 @@ def _notes(log: VerifiedLog, last: int) -> list[str]:
 
 def _world_notes(world: WorldReplayer | None, replayed: WorldReplay | None, types: WorldTypes, level: str) -> list[str]:
     if replayed is None and level != "hardware":
-        why = "records of it did not fit into the log's ring" if world is None else "its start is missing"
+        why = "records of it did not fit into the log's ring"
+        if world is not None:
+            why = "MuJoCo is not installed here" if world.engine_missing else "its start is missing"
         return [f"the world was not compared: {why}"]
     return types.state.notes(WORLD_TOPIC)
+
+
+def _engine_notes(facts: dict[str, str], rig: RigConfig) -> list[str]:
+    then, now = facts.get(ENGINE_FACT), engine_facts(rig).get(ENGINE_FACT)
+    return [f"the world was made by MuJoCo {then}, and run again by {now}"] if then and now and then != now else []
 
 
 def _derived_notes(derived: DerivedReplay) -> list[str]:
