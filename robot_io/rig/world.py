@@ -37,16 +37,18 @@ class SliderConfig(Table, frozen=True):
 
 
 class FloorConfig(Table, frozen=True):
-    """What the floor of the simulated world does beyond an even ellipsoid of friction; nothing by default."""
+    """The floor of the simulated world."""
 
-    push_height_m: Annotated[float, Meta(ge=0, le=2)] = 0.0
-    """Height of the push above the floor: moves the pressure ahead, by this times the floor's friction."""
-    turning: Literal["ellipsoid", "along-push"] = "ellipsoid"
-    """What resists turning: the greatest torque, or (right while sliding straight) the pressure along the push."""
+    push_height_m: Annotated[float, Meta(ge=0, le=2)] | None = None
+    """Height of the push above the floor: moves the pressure ahead, by this times the floor's friction. By default the
+    height of `frames.contact_in_base_m`; 0 is the paper's world."""
+    turning: Literal["ellipsoid", "along-push", "coulomb"] = "along-push"
+    """What resists turning: the pressure along the push, the greatest torque (`ellipsoid`, the paper's), or Coulomb
+    friction at each support point, the exact sum: slower (docs/simulation-studies.md)."""
     along_over_across: Annotated[float, Meta(ge=0.5, le=2)] = 1.0
     """Friction along the path over friction across it."""
     support_points: Annotated[int, Meta(ge=9, le=36)] = 16
-    """On about how many points the object stands, where points are used; a grid has the largest square below."""
+    """On about how many points the object stands for `coulomb`; a grid has the largest square below."""
     patch_strength: Annotated[float, Meta(ge=0, le=0.9)] = 0.0
     """How much the friction varies from place to place, relative to its mean; each seed is another floor."""
     patch_m: Annotated[float, Meta(ge=0.01, le=10)] = 0.3

@@ -61,6 +61,20 @@ def centre_of(points: Sequence[SupportPoint]) -> Point:
     return (fsum(w * x for x, _, w in points), fsum(w * y for _, y, w in points))
 
 
+def room_of(points: Sequence[SupportPoint]) -> float:
+    """Return how far the pressure's centre can move in any direction before the slider tips over (m)."""
+    x0, y0 = centre_of(points)
+    room = inf
+    for ax, ay, _ in points:
+        for bx, by, _ in points:
+            length = hypot(bx - ax, by - ay)
+            if length > _ON_THE_EDGE_M:
+                nx, ny = (ay - by) / length, (bx - ax) / length
+                if all((x - ax) * nx + (y - ay) * ny >= -_ON_THE_EDGE_M for x, y, _ in points):
+                    room = min(room, (x0 - ax) * nx + (y0 - ay) * ny)
+    return room
+
+
 def leaning(points: Sequence[SupportPoint], centre_m: Point) -> tuple[SupportPoint, ...]:
     """Return the points with the shares that a stiff body gives them when its load's centre is at `centre_m`.
 
@@ -96,10 +110,10 @@ def leaning(points: Sequence[SupportPoint], centre_m: Point) -> tuple[SupportPoi
 
 def _plane(points: Sequence[SupportPoint], to_x: float, to_y: float) -> tuple[float, float, float] | None:
     """Return the linear factor on the shares (1, x, y) that brings the load 1 to `to`, None where there is none."""
-    w = fsum(p[2] for p in points)
-    x, y = fsum(p[2] * p[0] for p in points), fsum(p[2] * p[1] for p in points)
-    xx, xy = fsum(p[2] * p[0] * p[0] for p in points), fsum(p[2] * p[0] * p[1] for p in points)
-    yy = fsum(p[2] * p[1] * p[1] for p in points)
+    w = x = y = xx = xy = yy = 0.0
+    for px, py, share in points:
+        w, x, y = w + share, x + share * px, y + share * py
+        xx, xy, yy = xx + share * px * px, xy + share * px * py, yy + share * py * py
     if w <= 0.0:
         return None
     # eliminate the constant: moments about the middle of these points

@@ -11,7 +11,7 @@ from robot_io.errors import ConfigError
 from robot_io.geometry import StraightPath, rotated
 from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
-from robot_io.rig.world import FloorConfig, SliderConfig
+from robot_io.rig.world import SliderConfig
 from sim_backend.physics.floor import Floor, FloorEffects
 from sim_backend.physics.shapes import Circle, Rectangle
 from sim_backend.physics.slider import SliderModel
@@ -62,11 +62,9 @@ def support_of(rig: RigConfig) -> tuple[SupportPoint, ...]:
 
 def floor_of(rig: RigConfig, seed: int) -> Floor | None:
     """Return the rig's floor effects beyond the slider's ellipsoid, or None without any. Raises ConfigError."""
-    config = rig.world.floor
-    if config == FloorConfig():
-        return None
+    config, slider = rig.world.floor, rig.world.slider
     effects = FloorEffects(
-        shift_m=rig.world.slider.floor_friction * config.push_height_m,
+        shift_m=slider.floor_friction * rig.push_height_m,
         turning=config.turning,
         along_over_across=config.along_over_across,
         grain_rad=math.radians(rig.path.direction_deg),
@@ -74,7 +72,9 @@ def floor_of(rig: RigConfig, seed: int) -> Floor | None:
         patch_m=config.patch_m,
         seed=seed,
     )
-    return Floor(slider_model(rig.world.slider), rig.world.slider.pressure, effects)
+    if effects.has_none:
+        return None
+    return Floor(slider_model(slider), slider.pressure, effects, config.support_points)
 
 
 def place(rig: RigConfig, seed: int) -> Scene:
