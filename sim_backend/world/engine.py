@@ -12,7 +12,6 @@ from sim_backend.physics.contact_outcome import ContactOutcome
 from sim_backend.physics.support import centre_of, leaning
 from sim_backend.world.base_plant import GRID_NS
 from sim_backend.world.scene import floor_of, shape_of, slider_model, support_of
-from sim_backend.world.truth import true_frames
 
 
 class PushedObject(Protocol):
@@ -56,7 +55,7 @@ def _rigid_slider(rig: RigConfig, at: tuple[float, float, float]) -> PushedObjec
             where="world.mujoco.timestep_s",
             do="Use 0.001, 0.0005, 0.00025 or another whole part of it",
         )
-    height = floor.push_height_m or true_frames(rig).contact_in_base_m[2]
+    height = rig.push_height_m
     support = support_of(rig)
     x, y = centre_of(support)
     leaning(support, (x + slider.floor_friction * height, y))  # tips over, or not

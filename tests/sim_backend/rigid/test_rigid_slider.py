@@ -172,8 +172,8 @@ def test_what_it_cannot_do_is_said(settings, words):
 
 def test_the_ball_pushes_where_it_is():
     """Without a push height of the floor it is the ball's own, from the frames."""
-    rig = rig_of("mujoco", "world.floor.push_height_m=0")
-    low = replace(rig, frames=replace(rig.frames, contact_in_base_m=(1.0, 0.0, 0.8)))
-    World(rig, 0, 0)
+    rig = rig_of("mujoco")
+    unset = replace(rig, world=replace(rig.world, floor=replace(rig.world.floor, push_height_m=None)))
+    World(unset, 0, 0)
     with pytest.raises(ConfigError, match="tips over"):
-        World(low, 0, 0)
+        World(replace(unset, frames=replace(rig.frames, contact_in_base_m=(1.0, 0.0, 0.8))), 0, 0)
