@@ -28,6 +28,8 @@ Grip = tuple[float, float, float, float, Grain | None]
 
 SUPPORT_ACROSS = 6
 """The pressure on a floor of patches is sampled at the points of a grid with this many per side."""
+LIFTED = 2 / 3
+"""What is left of an even pressure's spread when a side begins to lift: along-push goes no lower."""
 LOOK_AGAIN_M = 0.002
 """The patches under the slider are looked up again after one of its points has moved about this far."""
 
@@ -75,8 +77,10 @@ class Floor:
             raise ConfigError(f"{effects.along_over_across} is not a ratio of frictions", where="floor")
         if not (0 <= effects.patch_strength < 1 and 0 < effects.patch_m < inf):
             raise ConfigError("floor patches need a strength from 0 to below 1 and a size", where="floor")
-        self._model = model
-        self._effects = effects
+        self._effects, self._has_grain = effects, effects.along_over_across != 1.0
+        self._cof, self._d, self._f_max, self._shift_m = model.cof_m, model.d_m, model.f_max_N, effects.shift_m
+        middle = model.shape.centroid_m if isinstance(pressure, str) else model.cof_m
+        self._off_x, self._off_y = model.cof_m[0] - middle[0], model.cof_m[1] - middle[1]
         self._moment = _pressure_moment(model.shape, pressure) if effects.turning == "along-push" else None
         self.follows_push = effects.shift_m > 0 or self._moment is not None
         self.coulomb: CoulombFloor | None = None
@@ -113,24 +117,21 @@ class Floor:
 
     def grip(self, x: float, y: float, cos_: float, sin_: float, push_x: float, push_y: float) -> Grip:
         """Return the grip on the slider at a pose (m; cosine, sine of its heading), pushed along a BODY direction."""
-        model, effects = self._model, self._effects
         if self.coulomb is not None:
             self.coulomb.load(x, y, cos_, sin_, push_x, push_y)
-            return (*self.coulomb.centre_m, model.d_m, model.f_max_N, self._grain(cos_, sin_))
-        cof_x, cof_y = model.cof_m
-        d, f_max = model.d_m, model.f_max_N
+            return (*self.coulomb.centre_m, self._d, self._f_max, self._grain(cos_, sin_))
+        d, f_max, shift_m = self._d, self._f_max, self._shift_m
+        cof_x, cof_y = self._cof
         if self._moment is not None:
             xx, xy, yy = self._moment
             dd = xx * push_x * push_x + 2.0 * xy * push_x * push_y + yy * push_y * push_y
-            x0, y0 = model.shape.centroid_m
-            lean = effects.shift_m + (cof_x - x0) * push_x + (cof_y - y0) * push_y
-            d = sqrt(max(dd - lean * lean, dd * 2 / 3))
+            lean = shift_m + self._off_x * push_x + self._off_y * push_y
+            d = sqrt(max(dd - lean * lean, dd * LIFTED))
         if self._patches is not None:
             shift_x, shift_y, load, spread = self._patches(x, y, cos_, sin_)
             cof_x, cof_y, f_max, d = cof_x + shift_x, cof_y + shift_y, f_max * load, d * spread
-        cof_x += effects.shift_m * push_x
-        cof_y += effects.shift_m * push_y
-        return (cof_x, cof_y, d, f_max, self._grain(cos_, sin_))
+        grain = self._grain(cos_, sin_) if self._has_grain else None
+        return (cof_x + shift_m * push_x, cof_y + shift_m * push_y, d, f_max, grain)
 
     def _grain(self, cos_: float, sin_: float) -> Grain | None:
         """Return the floor's grain in BODY axes: 1 along its direction, the squared ratio across."""

@@ -102,6 +102,23 @@ def test_turning_while_pushed_straight_is_resisted_by_the_spread_along_the_push(
     assert grip(model, pressure, push, turning="along-push")[2] == pytest.approx(d)
 
 
+@pytest.mark.parametrize("pressure", ["uniform", "frame", "corners"])
+@pytest.mark.parametrize(("cof", "shift_m"), [((0.0, 0.0), 0.045), ((0.04, 0.0), 0.0), ((0.03, 0.02), 0.02)])
+def test_turning_is_resisted_about_where_the_pressure_is(pressure, cof, shift_m):
+    """The spread is about the centre of friction, wherever load and push have moved it; Coulomb friction says so."""
+    model = SliderModel.from_mass(
+        Rectangle(0.4, 0.6), mass_kg=5, floor_friction=0.3, contact_friction=5.0, pressure=pressure, cof_m=cof
+    )
+    x, y, d, f_max, _ = Floor(model, pressure, FloorEffects(shift_m, "along-push")).grip(0, 0, 1, 0, 1.0, 0.0)
+    exact = Floor(model, pressure, FloorEffects(shift_m, "coulomb"), 36)
+    exact.grip(0.0, 0.0, 1.0, 0.0, 1.0, 0.0)
+    centre = exact.coulomb.centre_m
+    # a push straight ahead, one millimetre beside the centre of friction
+    one = solve_exact(-0.2 - x, 1e-3, 1.0, 0.0, 0.1, 0.0, d, f_max, 5.0)
+    other = exact.coulomb.contact(-0.2 - centre[0], y + 1e-3 - centre[1], 1.0, 0.0, 0.1, 0.0, d, f_max, 5.0)
+    assert one.omega == pytest.approx(other.omega, rel=2e-3)
+
+
 def test_second_moment_of_a_slanted_polygon():
     shape = ConvexPolygon(((0, 0), (0.6, 0.1), (0.5, 0.4), (0.1, 0.5)))
     rng = random.Random(3)
