@@ -109,14 +109,19 @@ COMMANDS = {
         ("push completion bash", "push completion zsh"),
     ),
     "bench sim": Command(
-        "tools.commands.bench_sim",
+        "tools.bench.sim",
         "measure how much faster than real time level sim is",
         ("push bench sim", "push bench sim --distance-m 2 --json"),
     ),
     "bench physics": Command(
-        "tools.commands.bench_physics",
+        "tools.bench.physics",
         "measure the slider's solvers",
         ("push bench physics", "push bench physics --json"),
+    ),
+    "bench loop": Command(
+        "tools.bench.loop",
+        "measure how late the control loop wakes up on this machine",
+        ("push bench loop --full-stack", "push bench loop --rate 100 --load --json"),
     ),
 }
 

@@ -25,7 +25,7 @@ from tools.dev.fault_table import page as faults_page
 from tools.dev.fault_table import table
 from tools.dev.rig_reference import reference
 from tools.rig import resolve_rig
-from tools.study.grid import load_grid
+from tools.sweep.grid import load_grid
 
 ROOT = Path(__file__).parents[2]
 PUSH = Path(sys.executable).parent / "push"

@@ -28,7 +28,7 @@ from sim_backend.physics.gain_limits import (
 )
 from sim_backend.physics.slider import Circle, Rectangle
 from sim_backend.physics.support import PressureName
-from tools.study.tune_map import PRESETS
+from tools.sweep.tune_map import PRESETS
 from tools.terminal.arguments import named_path, number, pair
 
 Choice = TypeVar("Choice", bound=str)
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
         )
     k_y = _rounded_down(SHARE * highest)
     out = _folder(args.out)
-    from tools.study.limit_checks import check_integral_limits, check_limits
+    from tools.sweep.limit_checks import check_integral_limits, check_limits
 
     checks = [] if args.no_check else check_limits(bodies, k_f)
     integral = _integral(bodies, k_f, k_y) if args.law == "force-integral" else None
@@ -219,8 +219,8 @@ def _print_result(result: dict[str, Any], args: argparse.Namespace) -> None:
 
 
 def _draw(bodies: Sequence[PushedBody], recommended: tuple[float, float], what: str, out: Path) -> list[str]:
-    from tools.study.figures import save
-    from tools.study.tune_map import draw
+    from tools.sweep.figures import save
+    from tools.sweep.tune_map import draw
 
     fast = fast_loop_k_f(bodies)  # the limit drops to zero here, without a slope
     k_f = sorted((*MAP_K_F, *((math.nextafter(fast, 0.0), fast) if MAP_K_F[0] < fast < MAP_K_F[-1] else ())))

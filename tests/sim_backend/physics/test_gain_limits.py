@@ -18,7 +18,7 @@ from sim_backend.physics.gain_limits import (
     sticking_integral_limit,
     sticking_limit,
 )
-from tools.study.gain_check import growth_rate, simulated_integral_limit, simulated_limit
+from tools.sweep.gain_check import growth_rate, simulated_integral_limit, simulated_limit
 
 SQUARE_D = (math.sqrt(2) + math.asinh(1)) / 6
 BOX = PushedBody(round=False, rho_m=0.2, d_m=0.153, ball_radius_m=0.05, shift_m=0.045)

@@ -15,13 +15,14 @@ import pytest
 
 from robot_io.errors import EnvironmentFault, PushError
 from tools import cli
-from tools.study import items as sweep_items
-from tools.study import plan
-from tools.study.engine import run_items
-from tools.study.grid import load_grid
-from tools.study.items import COLUMNS, Part
-from tools.study.plan import LANE_SOURCES, ROOT
-from tools.study.store import Store
+from tools.parallel.engine import run_items
+from tools.parallel.part import Part
+from tools.parallel.store import Store
+from tools.sweep import items as sweep_items
+from tools.sweep import plan
+from tools.sweep.grid import load_grid
+from tools.sweep.items import COLUMNS
+from tools.sweep.plan import LANE_SOURCES, ROOT
 
 GRID = """
 name = "small"
@@ -121,13 +122,13 @@ def test_one_and_more_workers_and_an_interruption_give_the_same_bytes(tmp_path, 
             raise KeyboardInterrupt
         return real(item)
 
-    monkeypatch.setattr("tools.study.plan.run_lane_item", interrupted)
+    monkeypatch.setattr("tools.sweep.plan.run_lane_item", interrupted)
     code, _, err = push(capsys, grid, "--out", tmp_path / "cut", "--workers", 1)
     assert code == 130
     assert "4 of 9 cases done" in err
     assert "--resume" in err
     assert not (tmp_path / "cut" / "results.csv").exists()
-    monkeypatch.setattr("tools.study.plan.run_lane_item", real)
+    monkeypatch.setattr("tools.sweep.plan.run_lane_item", real)
     code, _, err = push(capsys, grid, "--out", tmp_path / "cut", "--workers", 1, "--resume")
     assert code == 0
     assert "2 of 5 parts are done already" in err
@@ -171,9 +172,9 @@ def test_a_part_of_another_study_is_run_again(tmp_path, grid, capsys):
 
 
 def test_all_program_text_of_a_lane_is_in_the_fingerprint():
-    code = "import sys, tools.study.items, sim_backend.physics.batch; print(*sys.modules)"
+    code = "import sys, tools.sweep.items, sim_backend.physics.batch; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    ours = {name for name in loaded if name.startswith(("sim_backend.physics.", "tools.study."))}
+    ours = {name for name in loaded if name.startswith(("sim_backend.physics.", "tools.sweep."))}
     assert ours == {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in LANE_SOURCES}
 
 
@@ -243,8 +244,8 @@ def test_a_case_beyond_the_range_of_numbers_is_an_error_and_no_nan(tmp_path, cap
 
 
 def test_the_figure_draws_a_lost_push_to_its_very_end():
-    from tools.study.figures import trajectories
-    from tools.study.grid import Case
+    from tools.sweep.figures import trajectories
+    from tools.sweep.grid import Case
 
     states = np.full((1, 3, 6), np.nan)
     states[0, 0] = 0.0  # lost before the second record

@@ -77,7 +77,7 @@ def test_a_cluster_gives_the_same_bytes(tmp_path, capsys):
 
 
 def test_no_scheduler_is_one_sentence(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("tools.study.engine.SCHEDULER_TIMEOUT_S", 0.5)
+    monkeypatch.setattr("tools.parallel.engine.SCHEDULER_TIMEOUT_S", 0.5)
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{closed.getsockname()[1]}"

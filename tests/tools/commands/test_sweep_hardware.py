@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tools import cli
-from tools.study import hardware as study_hardware
-from tools.study.hardware import hardware_items, rig_of, run_hardware_item
-from tools.study.hardware_summary import summarise_hardware
+from tools.sweep import hardware as study_hardware
+from tools.sweep.hardware import hardware_items, rig_of, run_hardware_item
+from tools.sweep.hardware_summary import summarise_hardware
 
 
 def test_ten_pushes_by_the_law_and_five_of_their_starts_open_loop():

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from robot_io.errors import UsageError
+from tools.parallel.part import Part, Row
 from tools.places.atomic_file import check_writable, write_atomically, write_json
-from tools.study.items import Part, Row
 
 STUDY_FILE = "study.json"
 

@@ -7,8 +7,8 @@ from statistics import median
 
 from sim_backend.physics.floor import FloorEffects
 from sim_backend.physics.support import MOST_POINTS, PressureName
-from tools.study.floors.closed_loop import push, rms_m, shift_m
-from tools.study.floors.starts import STARTS
+from tools.floors.closed_loop import push, rms_m, shift_m
+from tools.floors.starts import STARTS
 
 PRESSURES: tuple[PressureName, ...] = ("uniform", "centre", "frame", "corners")
 FLOORS = {

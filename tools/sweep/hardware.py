@@ -16,7 +16,7 @@ import msgspec
 
 from robot_io.errors import PushError, UsageError
 from robot_io.rig.config import RigConfig, load_rig
-from tools.study.items import Part, Row
+from tools.parallel.part import Part, Row
 
 CLOSED_RUNS = 10
 OPEN_RUNS = 5
@@ -167,7 +167,7 @@ def sources(root: Path) -> tuple[Path, ...]:
     found = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
     found += sorted((root / "robot_io" / "rig").glob("*.toml"))
     found += [root / f"tools/run/{name}.py" for name in ("lockstep", "run_state", "tick_core")]
-    return (*found, root / "tools/study/hardware.py")
+    return (*found, root / "tools/sweep/hardware.py")
 
 
 def check_flags(dt_s: float | None, open_loop: bool) -> None:

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any
 from robot_io.error_report import say_json, tell
 from sim_backend.physics.lanes import Lane, Timing, simulate_lane
 from sim_backend.physics.slider_exact import solve_exact
-from tools.study.engine import default_workers, run_items
-from tools.study.grid import lane_of
-from tools.study.items import cut, run_lane_item
-from tools.study.paper import paper_study
+from tools.parallel.engine import default_workers, run_items
+from tools.sweep.grid import lane_of
+from tools.sweep.items import cut, run_lane_item
+from tools.sweep.paper import paper_study
 
 if TYPE_CHECKING:
     import numpy as np

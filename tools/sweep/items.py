@@ -8,23 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from robot_io.errors import EnvironmentFault, PushError
 from sim_backend.physics.lanes import LaneEnd, LaneResult, Timing
-from tools.study.grid import Case, Study, lane_of
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from tools.parallel.part import Part, Row
+from tools.sweep.grid import Case, Study, lane_of
 
 STEPS_PER_ITEM = 1_700_000
 """About 0.1 s of work: enough to hide the cost of the transfer, little enough to lose on an interruption."""
 MOST_LANES_PER_ITEM = 1000
-
-Row = dict[str, str | int | float]
 
 PARAMETER_COLUMNS = (
     "lane", "shape", "length_m", "width_m", "radius_m", "pressure", "tau_max", "mu", "y0", "phi0", "s0",
@@ -44,13 +38,6 @@ class LaneItem(msgspec.Struct, frozen=True):
     first: int
     cases: tuple[Case, ...]
     timing: Timing
-
-
-class Part(msgspec.Struct, frozen=True):
-    """The result of one item: a row for each case, and named arrays."""
-
-    rows: list[Row]
-    arrays: dict[str, NDArray[np.float64]]
 
 
 def cut(study: Study) -> list[LaneItem]:

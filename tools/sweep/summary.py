@@ -8,8 +8,8 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from sim_backend.physics.lanes import LaneEnd
-from tools.study.grid import Case, Study
-from tools.study.items import Row
+from tools.parallel.part import Row
+from tools.sweep.grid import Case, Study
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sim_backend.physics.lanes import State, Timing
-from tools.study.grid import Case
-from tools.study.items import Row
+from tools.parallel.part import Row
+from tools.sweep.grid import Case
 
 if TYPE_CHECKING:
     import numpy as np
@@ -85,7 +85,7 @@ def experiment(rows: Sequence[Row], states: Floats) -> Figure:
 def samples(cases: Sequence[Case], timing: Timing) -> Figure:
     """Draw cases with the slider's outline, contact point and pushing direction along the first two minutes."""
     from sim_backend.physics.lanes import simulate_lane
-    from tools.study.grid import lane_of
+    from tools.sweep.grid import lane_of
 
     every = max(1, round(1.0 / timing.dt_s))
     steps = min(timing.steps, round(SAMPLE_SECONDS / timing.dt_s))

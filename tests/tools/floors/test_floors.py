@@ -14,11 +14,11 @@ from sim_backend.physics.lanes import LaneEnd, Timing, simulate_lane
 from sim_backend.physics.shapes import Circle, Rectangle
 from sim_backend.physics.support import support_points
 from sim_backend.world.scene import place, slider_model
-from tools.study.floors.closed_loop import push, rms_m, shift_m, slider_of
-from tools.study.floors.starts import STARTS, edge_offset_m, rig_of
-from tools.study.floors.table import rows
-from tools.study.grid import lane_of
-from tools.study.paper import paper_study
+from tools.floors.closed_loop import push, rms_m, shift_m, slider_of
+from tools.floors.starts import STARTS, edge_offset_m, rig_of
+from tools.floors.table import rows
+from tools.sweep.grid import lane_of
+from tools.sweep.paper import paper_study
 
 COULOMB, ALONG = (FloorEffects(shift_m(), turning) for turning in ("coulomb", "along-push"))
 

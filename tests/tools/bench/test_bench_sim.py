@@ -7,8 +7,8 @@ import math
 
 import pytest
 
+from tools.bench import sim as bench_sim
 from tools.cli import main
-from tools.commands import bench_sim
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from tools.study.grid import Case, Study, TimeTable, product, timing_of
+from tools.sweep.grid import Case, Study, TimeTable, product, timing_of
 
 SAMPLE_START = {"y0_m": -0.4, "phi0_rad": -math.pi / 8, "s0_m": -0.4, "pressure": "uniform"}
 """Start of the paper's four sample trajectories; each shape with contact friction 0 and 1."""

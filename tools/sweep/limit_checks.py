@@ -13,7 +13,7 @@ from sim_backend.physics.gain_limits import (
     sticking_integral_limit,
     sticking_limit,
 )
-from tools.study.gain_check import simulated_integral_limit, simulated_limit
+from tools.sweep.gain_check import simulated_integral_limit, simulated_limit
 
 
 def check_limits(bodies: Sequence[PushedBody], k_f: float) -> list[dict[str, Any]]:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from tools.study.hardware import CORRIDOR_M, DISTANCE_M, OPEN_LOOP_FAILS_M, SLIDERS
-from tools.study.items import Row
+from tools.parallel.part import Row
+from tools.sweep.hardware import CORRIDOR_M, DISTANCE_M, OPEN_LOOP_FAILS_M, SLIDERS
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,9 +9,9 @@ import pytest
 from sim_backend.physics.batch import STATISTICS, parameters, run_arrays
 from sim_backend.physics.lanes import Timing
 from tools import cli
-from tools.commands import bench_physics
-from tools.study.grid import lane_of
-from tools.study.paper import paper_study
+from tools.bench import physics as bench_physics
+from tools.sweep.grid import lane_of
+from tools.sweep.paper import paper_study
 
 
 def test_the_c_twin_computes_the_same(tmp_path):

@@ -9,30 +9,31 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
-from tools.study.grid import Study
-from tools.study.hardware import (
+from tools.parallel.part import Part
+from tools.sweep.grid import Study
+from tools.sweep.hardware import (
     COLUMNS as HARDWARE_COLUMNS,
 )
-from tools.study.hardware import (
+from tools.sweep.hardware import (
     check_flags,
     hardware_items,
     rig_of,
     run_hardware_item,
     sources,
 )
-from tools.study.hardware_summary import hardware_sentences, summarise_hardware
-from tools.study.items import COLUMNS, Part, cut, run_lane_item
-from tools.study.paper import sample_cases
+from tools.sweep.hardware_summary import hardware_sentences, summarise_hardware
+from tools.sweep.items import COLUMNS, cut, run_lane_item
+from tools.sweep.paper import sample_cases
 
 if TYPE_CHECKING:
-    from tools.study.store import Store
+    from tools.parallel.store import Store
 
 ROOT = Path(__file__).resolve().parents[2]
 LANE_SOURCES = tuple(
     ROOT / f"{name}.py"
     for name in (
         "sim_backend/physics/batch", "sim_backend/physics/lanes", "sim_backend/physics/shapes",
-        "sim_backend/physics/slider", "sim_backend/physics/slider_exact", "tools/study/grid", "tools/study/items",
+        "sim_backend/physics/slider", "sim_backend/physics/slider_exact", "tools/sweep/grid", "tools/sweep/items",
     )
 )  # fmt: skip
 
@@ -88,8 +89,8 @@ def _write_lanes(study: Study, store: Store, parts: list[Part]) -> tuple[dict[st
     """Write results.csv, states.npz, summary.json and the figures."""
     import numpy as np
 
-    from tools.study import figures as sweep_figures
-    from tools.study.summary import sentences, summarise
+    from tools.sweep import figures as sweep_figures
+    from tools.sweep.summary import sentences, summarise
 
     rows = [row for part in parts for row in part.rows]
     states = np.concatenate([part.arrays["states"] for part in parts])
@@ -111,7 +112,7 @@ def _write_hardware(store: Store, parts: list[Part]) -> tuple[dict[str, Any], li
     """Write results.csv, states.npz (slider poses, NaN after a run's end), summary.json and the figure."""
     import numpy as np
 
-    from tools.study import figures as sweep_figures
+    from tools.sweep import figures as sweep_figures
 
     rows = [row for part in parts for row in part.rows]
     longest = max(len(part.arrays["slider"]) for part in parts)

@@ -12,7 +12,7 @@ from sim_backend.physics.contact import PushedSlider
 from sim_backend.physics.floor import Floor, FloorEffects
 from sim_backend.physics.slider import Circle, Rectangle, SliderModel
 from sim_backend.physics.support import SUPPORT_POINTS, Pressure
-from tools.study.floors.starts import DISTANCE_M, FLOOR_FRICTION, PUSH_HEIGHT_M, Start, edge_offset_m
+from tools.floors.starts import DISTANCE_M, FLOOR_FRICTION, PUSH_HEIGHT_M, Start, edge_offset_m
 
 BALL_RADIUS_M = 0.05
 STEP_M = 1e-3

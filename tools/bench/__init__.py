@@ -1,0 +1,1 @@
+"""Measures this machine: one module a command (`push bench sim`, `push bench physics`, `push bench loop`)."""
