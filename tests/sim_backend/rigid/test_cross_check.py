@@ -12,7 +12,7 @@ import pytest
 
 from sim_backend.rigid import model
 from tests.control.closed_loop import ClosedLoop
-from tools.study.floors.starts import STARTS, rig_settings
+from tools.floors.starts import STARTS, rig_settings
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(1800)]
 
