@@ -114,9 +114,22 @@ class HandConfig(Table, frozen=True):
     """On the ball, BODY frame: [-10, 0, 0] presses it backward."""
 
 
+class MujocoConfig(Table, frozen=True):
+    """MuJoCo's settings, for `world.engine = "mujoco"`."""
+
+    timestep_s: Annotated[float, Meta(ge=1e-5, le=1e-3)] = 0.001
+    """Step of the integration: a whole part of a millisecond."""
+    impratio: Annotated[float, Meta(ge=1, le=1e5)] = 10.0
+    """How much stiffer friction is than the normal force."""
+
+
 class WorldConfig(Table, frozen=True):
     """The simulated world, used at levels sim and emulated."""
 
+    engine: Literal["quasistatic", "mujoco"] = "quasistatic"
+    """What moves the object: the closed form, or MuJoCo (extra `mujoco`), where it is a body of six degrees of freedom
+    on feet, the `support_points` of its pressure; `turning` is then MuJoCo's own."""
+    mujoco: MujocoConfig = MujocoConfig()
     solver: Literal["exact", "osqp"] = "exact"
     """The closed form, or the paper's program by OSQP (to 1e-6 the same, and much slower)."""
     ball_radius_m: Annotated[float, Meta(ge=0.001, le=0.2)] = 0.05

@@ -13,12 +13,13 @@ from robot_io.geometry import point_outside, seen_from_frame
 from robot_io.log.world_messages import WorldCommand, WorldStall, WorldStart, WorldState
 from robot_io.messages import BodyTwist, Joints, Pose2D, Vector3
 from robot_io.rig.config import RigConfig
-from sim_backend.physics.contact import FREE, PushedSlider
+from sim_backend.physics.contact_outcome import FREE
 from sim_backend.world.arm_geometry import held_elsewhere
 from sim_backend.world.base_plant import GRID_NS, BasePlant
+from sim_backend.world.engine import pushed_object
 from sim_backend.world.human import Human
 from sim_backend.world.plant import ArmTruth, BaseTruth
-from sim_backend.world.scene import floor_of, place, slider_model
+from sim_backend.world.scene import place
 from sim_backend.world.sensor_model import SensorModel
 from sim_backend.world.truth import true_frames
 
@@ -52,13 +53,7 @@ class World:
             rate_error=rig.world.base_tick_rate_error,
             slip=rig.world.slip,
         )
-        self._slider = PushedSlider(
-            slider_model(rig.world.slider),
-            (scene.slider.x, scene.slider.y, scene.slider.yaw),
-            rig.world.ball_radius_m,
-            rig.world.solver,
-            floor_of(rig, seed),
-        )
+        self._slider = pushed_object(rig, seed, scene.slider)
         self._sensor = SensorModel(rig, seed)
         frames = true_frames(rig)
         self._held, self._base_from_sensor = rig.arm.held_pose_rad, frames.base_from_sensor

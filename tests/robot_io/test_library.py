@@ -87,13 +87,14 @@ def test_the_extra_app_is_what_the_application_imports_besides():
     ours = {"robot_io", "control", "safety", "sim_backend", "tools"}
     names = set(imported_by(*(ours - {"robot_io"}))) - sys.stdlib_module_names - ours
     requirements = metadata.requires("single-point-push")
-    for_studies, for_viewers = {"numba", "distributed"}, {"foxglove-sdk"}
+    for_studies, for_viewers, for_its_world = {"numba", "distributed"}, {"foxglove-sdk"}, {"mujoco"}
     with_osqp = {"scipy"}
     names = {NAME_TO_INSTALL.get(name, name) for name in names}
-    besides = names - needed(requirements) - for_studies - for_viewers - with_osqp
+    besides = names - needed(requirements) - for_studies - for_viewers - for_its_world - with_osqp
     assert besides == needed(requirements, "app")
     assert for_studies <= needed(requirements, "cluster")
     assert for_viewers <= needed(requirements, "live")
+    assert for_its_world <= needed(requirements, "mujoco")
 
 
 @pytest.fixture

@@ -127,6 +127,7 @@ class _Session:
                 world,
                 self._types,
                 has_world=self._world is not None,
+                engine_missing=self._world is not None and self._world.engine_missing,
                 ticks_only=self._ticks_only,
             ),
             self._made_by,

@@ -15,6 +15,7 @@ from tools.replay.derived import DerivedReplay
 from tools.replay.difference import Difference
 from tools.replay.verified_log import VerifiedLog
 from tools.replay.world import WorldReplay, WorldTypes
+from tools.run.facts.code_facts import ENGINE_FACT, engine_facts
 from tools.run.facts.run_facts import level_of
 
 
@@ -60,9 +61,13 @@ def notes_of(
     types: WorldTypes,
     *,
     has_world: bool,
+    engine_missing: bool,
     ticks_only: bool,
 ) -> tuple[str, ...]:
-    """Return in words what could not be compared. has_world: whether the log holds all records of its world."""
+    """Return in words what could not be compared. 
+
+    has_world: whether the log holds all records of its world. engine_missing: what moved it is not installed here.
+    """
     notes = [*dict.fromkeys(note for log in logs for note in log.notes), *logs[0].ticks.notes("/control/tick")]
     if not all(log.complete for log in logs):
         notes.append(f"the log was recovered: it ends with tick {last_tick}; everything after that is lost")
@@ -73,11 +78,19 @@ def notes_of(
     if world is None and level_of(rig) != "hardware":
         later = logs[0].facts.get(PART_FACT, "1") != "1"
         start = "it began in an earlier part" if later else "its start is missing"
+        if engine_missing:
+            start = "MuJoCo is not installed here"
         why = start if has_world else "records of it did not fit into the log's ring"
         notes.append(f"the world was not compared: {why}")
     elif world is not None:
         notes += types.state.notes(WORLD_TOPIC)
+    notes += _engine_notes(logs[0].facts, rig)
     if derived is not None and derived.not_compared:
         words = ", ".join(derived.not_compared)
         notes.append(f"not compared, because they are derived differently today: {words}")
     return tuple(notes)
+
+
+def _engine_notes(facts: dict[str, str], rig: RigConfig) -> list[str]:
+    then, now = facts.get(ENGINE_FACT), engine_facts(rig).get(ENGINE_FACT)
+    return [f"the world was made by MuJoCo {then}, and run again by {now}"] if then and now and then != now else []

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from robot_io.errors import EnvironmentFault
 from robot_io.log.logged_type import LoggedType
 from robot_io.log.world_messages import STATE_CDR, WorldCommand, WorldStart, WorldState
 from robot_io.rig.config import RigConfig
@@ -45,13 +46,18 @@ class WorldReplayer:
         self._replayed: deque[WorldState] = deque()
         self._states = self._identical = 0
         self._first: Difference | None = None
+        self.engine_missing = False
+        """Whether the world is one of MuJoCo, and that is not installed here."""
 
     def take(self, topic: str, payload: bytes) -> None:
         """Take one record. Raises LogDamaged if it cannot be decoded."""
         if topic == "/world/start":
             start = self._types.start.decode(payload)
             self._replayed.clear()
-            self._world = World(self._rig, start.seed, start.start_ns, self._keep)
+            try:
+                self._world = World(self._rig, start.seed, start.start_ns, self._keep)
+            except EnvironmentFault:
+                self.engine_missing = True
         elif self._world is None:
             return
         elif topic == "/world/command":

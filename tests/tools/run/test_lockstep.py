@@ -74,7 +74,7 @@ def test_nothing_of_the_place_the_time_or_the_user_is_in_the_log(tmp_path):
 
 HEAVY = (
     "matplotlib", "scipy", "numpy", "osqp", "websockets", "wsproto", "rtde_receive", "rtde_control", "serial",
-    "minimalmodbus", "joblib", "numba", "distributed", "asyncio", "multiprocessing", "lz4",
+    "minimalmodbus", "joblib", "numba", "distributed", "mujoco", "asyncio", "multiprocessing", "lz4",
 )  # fmt: skip
 
 

@@ -10,8 +10,10 @@ from pathlib import Path
 
 from robot_io import __version__
 from robot_io.log.log_format import FORMAT_FACT, LOG_FORMAT
+from robot_io.rig.config import RigConfig
 
 COMMIT_FACT, DIRTY_FACT, PROGRAM_FACT = "commit", "dirty", "program"
+ENGINE_FACT = "mujoco"
 GIT_MAX_S = 0.2
 _CHECKOUT = Path(__file__).resolve().parents[3]
 _PACKAGES = ("numpy", "mcap", "msgspec", "ur-rtde")
@@ -28,6 +30,11 @@ def code_facts() -> dict[str, str]:
         **commit_of(_CHECKOUT),
         **{name: found for name in _PACKAGES if (found := _version(name))},
     }
+
+
+def engine_facts(rig: RigConfig) -> dict[str, str]:
+    """Return the version of the engine that moves the world's object; empty for the closed form, which is ours."""
+    return {ENGINE_FACT: _version("mujoco")} if rig.world.engine == "mujoco" else {}
 
 
 def commit_of(checkout: Path) -> dict[str, str]:

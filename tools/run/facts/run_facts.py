@@ -8,7 +8,7 @@ import platform
 from robot_io.rig.config import RigConfig
 from tools.laws import law_label, shipped_state
 from tools.run.facts.bounds import bounds_of
-from tools.run.facts.code_facts import code_facts
+from tools.run.facts.code_facts import code_facts, engine_facts
 
 LAW_FACT, LAW_SOURCE_FACT = "law", "law_source_sha256"
 
@@ -27,6 +27,7 @@ def run_facts(rig: RigConfig, seed: int, *, in_contact: bool, note: str = "") ->
     """Return the facts of a run; none differs between two runs of the same code on the same machine."""
     return {
         **code_and_machine(),
+        **engine_facts(rig),
         "level": level_of(rig),
         "seed": str(seed),
         "in_contact": str(in_contact),

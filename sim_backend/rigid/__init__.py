@@ -1,0 +1,1 @@
+"""The pushed object as a rigid body of six degrees of freedom on feet, moved by MuJoCo instead of the closed form."""
