@@ -26,6 +26,7 @@ from tools.log.stamp_ages import Latency, StampAges
 from tools.log.tick_topics import Message
 
 OFFSET_FACT = "wall_offset_ns"
+DERIVED_FACT, NOT_DERIVED = "derived_topics", "left out"
 STAMPED = (Kind.BASE_POSE, Kind.SLIDER_POSE, Kind.BASE_ODOM)
 """Records that have their sender's stamp."""
 
@@ -35,7 +36,8 @@ class RunLog:
 
     config_text: the resolved rig. wall_offset_ns: added to each record's time to get its log time; stored in
     `metadata`. also: called with topic, log time and payload of each message that was written. Raises as `McapLog` and
-    `rig_from_toml`; OSError when writing to disk fails.
+    `rig_from_toml`; OSError when writing to disk fails. derive: whether the topics made of others are written,
+    too; what is left out can be derived again.
     """
 
     def __init__(
@@ -46,8 +48,12 @@ class RunLog:
         metadata: dict[str, str],
         wall_offset_ns: int,
         also: Callable[[str, int, bytes], None] | None = None,
+        derive: bool = True,
     ) -> None:
         self._also = also
+        self._derives = derive
+        if not derive:
+            metadata = metadata | {DERIVED_FACT: NOT_DERIVED}
         self._derive = Derivation(rig_from_toml(config_text), wall_offset_ns)
         self._offset_ns = wall_offset_ns
         self._log = McapLog(path, config_text=config_text, metadata={**metadata, OFFSET_FACT: str(wall_offset_ns)})
@@ -98,7 +104,7 @@ class RunLog:
                 self._ages[CHANNELS[kind].topic].note(payload, log_time_ns)
             elif kind == Kind.BASE_CLOCK:
                 self._note_clock(payload)
-            if kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
+            if self._derives and kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
                 self._slider(kind, log_time_ns, payload)
         else:
             self.unknown_kinds += 1
@@ -109,8 +115,9 @@ class RunLog:
         if tick is None:
             self.undecodable += 1
             return
-        for derived in self._derive.tick(tick):
-            self._write(derived)
+        if self._derives:
+            for derived in self._derive.tick(tick):
+                self._write(derived)
 
     def flush(self) -> None:
         """Flush everything to the operating system."""
@@ -134,7 +141,7 @@ class RunLog:
         self._log.abandon()
 
     def _write(self, message: Message) -> None:
-        if not self._scene_written:
+        if self._derives and not self._scene_written:
             self._scene_written = True  # not earlier: the first record's time is the start of the log
             for first in self._derive.scene(message.log_time_ns):
                 self._write(first)

@@ -16,6 +16,7 @@ from robot_io.log.logged_type import LoggedType
 from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.tick import TICK_CDR, ControlTick, TickState
 from tools.log.derivation import WORLD_TOPIC
+from tools.log.run_log import DERIVED_FACT, NOT_DERIVED
 from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplay, BaseInputsReplayer
 from tools.replay.code_origin import CodeOrigin
 from tools.replay.derived import DerivedReplay, DerivedReplayer
@@ -74,18 +75,21 @@ def replay(path: Path, *, tolerance: float | None = None, law: str = "") -> Repl
     arrived = (
         BaseInputsReplayer(log.wall_offset_ns, log.channels, log.made_by.format, tolerance) if comparable else None
     )
+    left_out = log.facts.get(DERIVED_FACT) == NOT_DERIVED
     for topic, log_time_ns, payload, tick in log.messages():
         if tick is not None:
             ticks.take(tick, payload)
-            derived.tick(tick, log_time_ns)
+            if not left_out:
+                derived.tick(tick, log_time_ns)
             if arrived is not None:
                 arrived.tick(tick)
             continue
         if topic.startswith(PREFIX) and world is not None:
             world.take(topic, payload)
-        if topic == WORLD_TOPIC:
+        if topic == WORLD_TOPIC and not left_out:
             derived.world(types.state.decode(payload), log_time_ns)
-        derived.seen(topic, log_time_ns, payload)
+        if not left_out:
+            derived.seen(topic, log_time_ns, payload)
         if arrived is not None:
             arrived.seen(topic, log_time_ns, payload)
     world_replay = None if world is None else world.result()
@@ -102,7 +106,7 @@ def replay(path: Path, *, tolerance: float | None = None, law: str = "") -> Repl
         (
             *_notes(log, ticks.last),
             *_world_notes(world, world_replay, types, level_of(rig)),
-            *_derived_notes(derived_replay),
+            *_derived_notes(derived_replay, left_out),
         ),
         made_by,
         log.facts,
@@ -128,7 +132,9 @@ def _world_notes(world: WorldReplayer | None, replayed: WorldReplay | None, type
     return types.state.notes(WORLD_TOPIC)
 
 
-def _derived_notes(derived: DerivedReplay) -> list[str]:
+def _derived_notes(derived: DerivedReplay, left_out: bool) -> list[str]:
+    if left_out:
+        return ["topics that are derived from others were left out of this log"]
     if not derived.not_compared:
         return []
     return [f"not compared, because they are derived differently today: {', '.join(derived.not_compared)}"]
