@@ -93,7 +93,7 @@ def replay(path: Path, *, tolerance: float | None = None, law: str = "") -> Repl
         if arrived is not None:
             arrived.seen(topic, log_time_ns, payload)
     world_replay = None if world is None else world.result()
-    derived_replay = derived.result(complete=log.complete)
+    derived_replay = DerivedReplay(0, 0, None, ()) if left_out else derived.result(complete=log.complete)
     result = ReplayResult(
         ticks.count,
         ticks.identical,
