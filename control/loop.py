@@ -14,8 +14,9 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
+from control.ft_input import ft_input
 from control.notes.run_notes import RunNotes
-from control.pacer import wake
+from control.pacer import spin_until, wake
 from control.silence import Silence
 from control.timing import LoopTiming
 from robot_io.clock import ClockNs, asleep_ns, monotonic_ns
@@ -27,14 +28,11 @@ from robot_io.messages import ArmRecord, BodyTwist, DeviceHealth, LinkState, Sen
 from robot_io.tick import (
     TICK_CDR,
     ControlTick,
-    FtInput,
-    FtReading,
     HostInput,
     Operator,
     TickInput,
     TickOutput,
     TickState,
-    link_number,
 )
 
 OPERATOR_BYTES = {b"S": Operator.STOP, b"R": Operator.RESUME}
@@ -104,7 +102,7 @@ class ControlLoop:
     ) -> None:
         self._fold = fold
         self._state = state
-        self._period_ns = round(1e9 / rate_hz)
+        self._period_ns, self._spin_ns = round(1e9 / rate_hz), 0
         self._status_every = max(1, round(rate_hz / 5.0))
         self._sensor, self._arm, self._base, self._ring, self._watch = sensor, arm, base, ring, watch
         self._operator_fd, self._on_status = operator_fd, on_status
@@ -118,7 +116,7 @@ class ControlLoop:
         self._readings: list[Stamped[SensorWrench]] = []
         self._operator, self._paused = Operator.NONE, False
         self._launcher, self._recorder = Silence(), Silence()
-        self._consumed = self._taken = self._last_tick_ns = self._asleep_ns = 0
+        self._consumed = self._taken = self._last_tick_ns = self._asleep_ns = self._woken_ns = 0
         self._recorded = False  # whether the state before this tick is the end of the newest record in the ring
         self._arm_record = ArmRecord()
         self.timing = LoopTiming()
@@ -127,8 +125,12 @@ class ControlLoop:
         self.last: tuple[TickInput, TickState, TickOutput] | None = None
         self.error: BaseException | None = None
 
-    def run(self) -> None:
-        """Run until finished. An exception in a tick sends zero, is logged as F68, and is kept in `error`."""
+    def run(self, spin_us: float = 0.0) -> None:
+        """Run until finished, waiting awake for the last `spin_us` before each deadline.
+
+        An exception in a tick sends zero, is logged as F68, and is kept in `error`.
+        """
+        self._spin_ns = round(spin_us * 1e3)
         self._sensor_fd = self._sensor.fileno()
         self._loop.add_fd(self._sensor_fd, self._on_sensor)
         self._loop.add_fd(self._operator_fd, self._on_operator)
@@ -137,7 +139,7 @@ class ControlLoop:
             self._loop.add_fd(pidfd, partial(self._on_gone, name))
         self.first_ns = self._clock() + self._period_ns
         self._launcher.heard(self.first_ns)
-        self._timer = self._loop.call_at(self.first_ns, self._on_deadline)
+        self._sleep_until(self.first_ns)
         try:
             self._loop.run()
         finally:
@@ -193,10 +195,15 @@ class ControlLoop:
         self._watch.gone.add(name)
         self._loop.remove_fd(self._watch.pidfds[name])
 
-    def _on_deadline(self, deadline_ns: int) -> None:
-        now_ns = self._clock()
+    def _sleep_until(self, deadline_ns: int) -> None:
+        self._timer = self._loop.call_at(deadline_ns - self._spin_ns, self._on_deadline)
+
+    def _on_deadline(self, woken_ns: int) -> None:
+        deadline_ns = woken_ns + self._spin_ns
+        now_ns = spin_until(deadline_ns, self._clock)
+        self._woken_ns = now_ns
         paced = wake(deadline_ns, self._period_ns, now_ns)
-        self._timer = self._loop.call_at(paced.next_deadline_ns, self._on_deadline)
+        self._sleep_until(paced.next_deadline_ns)
         self._tick += 1 + paced.skipped
         self._collect()
         self._on_operator(0)
@@ -215,8 +222,13 @@ class ControlLoop:
 
     def _one_tick(self, inp: TickInput) -> None:
         after, output = self._fold(self._state, inp)
+        folded_ns = self._clock()
         self._base.command(output.command_body, tick=inp.tick, mode=output.mode)
+        sent_ns = self._clock()
         self._record(inp, after, output)
+        deadline_ns = self._woken_ns - inp.host.late_ns
+        self.timing.note_stages(deadline_ns, self._woken_ns, inp.now_ns, folded_ns, sent_ns)
+        self.timing.note_record(self._clock() - sent_ns)
         self._state = after
         self.last = (inp, after, output)
         self.notes.note(inp, after, output)
@@ -280,20 +292,3 @@ class ControlLoop:
             self._base.read(),
             self._paused,
         )
-
-
-def ft_input(
-    readings: list[Stamped[SensorWrench]] | tuple[Stamped[SensorWrench], ...], health: DeviceHealth, taken: int
-) -> FtInput:
-    """Return the sensor's part of a tick's input; `taken`: all readings so far, if the driver does not count them."""
-    counters = health.counters
-    return FtInput(
-        tuple(
-            FtReading(s.received_ns, s.seq, (s.value.fx, s.value.fy, s.value.fz), (s.value.mx, s.value.my, s.value.mz))
-            for s in readings
-        ),
-        link_number(health.state),
-        counters.get("packets_ok", taken),
-        counters.get("crc_fail", 0),
-        counters.get("junk_bytes", 0),
-    )

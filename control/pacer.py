@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import msgspec
 
 
@@ -23,3 +25,11 @@ def wake(deadline_ns: int, period_ns: int, now_ns: int) -> Wake:
     skipped = max(0, (now_ns - deadline_ns) // period_ns)
     served_ns = deadline_ns + skipped * period_ns
     return Wake(served_ns, now_ns - served_ns, skipped, served_ns + period_ns)
+
+
+def spin_until(deadline_ns: int, clock: Callable[[], int]) -> int:
+    """Wait awake until `deadline_ns` and return the time; at once when it is past."""
+    now_ns = clock()
+    while now_ns < deadline_ns:
+        now_ns = clock()
+    return now_ns

@@ -133,6 +133,11 @@ COMMANDS = {
         "measure the slider's solvers",
         ("push bench physics", "push bench physics --json"),
     ),
+    "bench loop": Command(
+        "tools.bench.loop",
+        "measure how late the control loop wakes up on this machine",
+        ("push bench loop --full-stack", "push bench loop --rate 100 --load --json"),
+    ),
 }
 
 ACTIONS = {

@@ -23,6 +23,8 @@ _CLOCK_MONOTONIC = 1
 _TFD_NONBLOCK = os.O_NONBLOCK
 _TFD_CLOEXEC = os.O_CLOEXEC
 _TFD_TIMER_ABSTIME = 1
+_FIRED = -1
+"""Setting the timer again takes its expiration back: reading it away would be one more system call before each tick."""
 
 
 class _Timespec(ctypes.Structure):
@@ -50,17 +52,10 @@ class TimerFd:
         return self._fd
 
     def set_ns(self, deadline_ns: int) -> None:
-        """Fire once at `deadline_ns` (at once when it is past); 0 disarms."""
+        """Fire once at `deadline_ns` (at once when it is past); 0 disarms. An expiration not read is taken back."""
         self._spec.it_value.tv_sec, self._spec.it_value.tv_nsec = divmod(deadline_ns, NS_PER_S)
         if _libc.timerfd_settime(self._fd, _TFD_TIMER_ABSTIME, ctypes.byref(self._spec), None) != 0:
             raise OSError(ctypes.get_errno(), "timerfd_settime failed")
-
-    def clear(self) -> None:
-        """Read away a pending expiration."""
-        try:
-            os.read(self._fd, 8)
-        except BlockingIOError:
-            return
 
     def close(self) -> None:
         """Close the descriptor; idempotent."""
@@ -139,8 +134,7 @@ class EventLoop:
         self._arm()
         for fd, events in self._epoll.poll(timeout_ms / 1000 if timeout_ms >= 0 else -1):
             if fd == self._timer_fd.fileno():
-                self._timer_fd.clear()
-                self._armed_ns = 0
+                self._armed_ns = _FIRED
                 self._fire()
             else:
                 handler = self._handlers.get(fd)  # an earlier handler of this round may have removed it

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.pacer import wake
+from control.pacer import spin_until, wake
 from control.speed_profile import CREEP_M_PER_S, approach_speed, push_speed
-from control.timing import BUCKET_NS, BUCKETS, LoopTiming
+from control.timing import LoopTiming
 
 MS = 1_000_000
 
@@ -52,12 +52,30 @@ def test_the_histogram_counts_ticks_and_percentiles():
     timing.note(2_000_000, 1, 900_000)
     timing.note(10**12, 7, 100)  # beyond the last bucket
     assert (timing.ticks, timing.skipped) == (100, 8)
-    assert timing.late_percentile_ms(50.0) == pytest.approx(0.06)
-    assert timing.late_percentile_ms(99.0) == pytest.approx(2.01)
-    assert timing.late_percentile_ms(100.0) == pytest.approx(BUCKETS * BUCKET_NS * 1e-6)
+    assert timing.late_percentile_ms(50.0) == pytest.approx(0.051)  # in steps of 1 us, rounded up
+    assert timing.late_percentile_ms(99.0) == pytest.approx(2.001)
+    assert timing.late_percentile_ms(100.0) == pytest.approx(50.0)
     found = timing.summary(100.0, 0, 990_000_000)
     assert (found["measured_hz"], found["late_worst_ms"], found["compute_worst_ms"]) == (100.0, 1e6, 0.9)
     assert LoopTiming().summary(100.0, 5, 5)["measured_hz"] == 0.0
+
+
+def test_the_stages_of_a_tick_add_up_to_its_time():
+    timing = LoopTiming()
+    for wake_ns in (40_000, 60_000):
+        timing.note_stages(0, wake_ns, wake_ns + 30_000, wake_ns + 130_000, wake_ns + 150_000)
+        timing.note_record(70_000)
+    found = timing.summary(100.0, 0, 1)
+    assert found["stages_us"] == {"wake": 50.0, "input": 30.0, "fold": 100.0, "send": 20.0, "record": 70.0}
+    assert found["to_gate_p50_ms"] == 0.191  # from the deadline to the frame's departure
+    assert found["to_gate_p99_ms"] == 0.211
+
+
+@pytest.mark.parametrize(("times", "woken_at", "asked"), [((7, 8, 9, 10, 11), 10, 4), ((12,), 12, 1)])
+def test_waiting_awake_ends_at_the_deadline_or_at_once(times, woken_at, asked):
+    clock = iter(times)
+    assert spin_until(10, lambda: next(clock)) == woken_at
+    assert len(list(clock)) == len(times) - asked
 
 
 @pytest.mark.parametrize(

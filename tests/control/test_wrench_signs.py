@@ -21,7 +21,7 @@ from msgspec.structs import replace
 
 import control.wrench
 import sim_backend.world.sensor_model
-from control.loop import ft_input
+from control.ft_input import ft_input
 from control.settings import Settings
 from control.step import step
 from robot_io.ft300.codec import StreamParser, wrench_from_counts

@@ -1,1 +1,1 @@
-"""The commands `push bench ...`: what the program costs on this machine."""
+"""Measures this machine: one module a command (`push bench sim`, `push bench physics`, `push bench loop`)."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from robot_io.ipc.process import leave_realtime, try_realtime
 from robot_io.rig.config import RigConfig
+from safety.gate_process import PRIORITY as HIGHEST_PRIORITY
 from safety.motion_bounds import total_bounds
 from tools.doctor.check import Check, Rows
 from tools.run.awake import SYSTEMD
@@ -42,11 +43,11 @@ def host_checks(rig: RigConfig) -> list[Check]:
 
 
 def _scheduling(rows: Rows, rig: RigConfig) -> None:
-    if try_realtime(1):
+    if try_realtime(HIGHEST_PRIORITY):
         leave_realtime()
         rows.ok("scheduling", "real-time priority is allowed")
         return
-    fix = f'Put "@YOUR_GROUP - rtprio 80" into {LIMITS_FILE} and log in again'
+    fix = f'Put "@YOUR_GROUP - rtprio 85" into {LIMITS_FILE} and log in again'
     rate_hz = rig.loop.rate_hz
     told = f"no permission for real-time priority: only {PLAIN_RATE_HZ:g} Hz is supported"
     rows.bad("scheduling", "failed" if rate_hz > PLAIN_RATE_HZ else "warning", told, fix, rate_hz, PLAIN_RATE_HZ, "Hz")

@@ -21,7 +21,8 @@ from robot_io.driver import Sensor
 from robot_io.errors import EnvironmentFault, PushError
 from robot_io.ipc.deadman import Deadman
 from robot_io.ipc.gate_link import GateLink
-from robot_io.ipc.process import die_with_parent, lock_memory, set_timer_slack_1ns, try_realtime
+from robot_io.ipc.process import die_with_parent, set_timer_slack_1ns
+from robot_io.ipc.realtime import RealtimeFacts, set_up_realtime
 from robot_io.ipc.ring import Ring
 from robot_io.ipc.status import StatusPipe
 from robot_io.kinds import build_driver, started
@@ -97,7 +98,8 @@ def main() -> int:
     except SystemExit:  # SIGTERM during the start: a stream that has begun is not left running
         sensor.close()
         raise
-    status.say("ready", info=msgspec.to_builtins(info), realtime=try_realtime(PRIORITY))
+    got = set_up_realtime(PRIORITY, cpu=rig.loop.cpu, spin_us=rig.loop.spin_us)
+    status.say("ready", info=msgspec.to_builtins(info), realtime=got.fifo)
     if not _wait_for_go(job.operator_fd, sensor, status):
         base.close()
         sensor.stop()
@@ -106,13 +108,12 @@ def main() -> int:
     gc.collect()
     gc.freeze()
     gc.disable()
-    lock_memory()
     injection.begin(monotonic_ns() + round(NS_PER_S / rig.loop.rate_hz))
-    loop.run()
+    loop.run(got.spin_us)
     deadman.release()
     base.close()  # first: the gate reads the EOF as the end and sends its last zeros
     gc.enable()
-    return _finish(loop, sensor, status, rig.loop.rate_hz, injection.counts("ft", "arm"))
+    return _finish(loop, sensor, status, rig.loop.rate_hz, injection.counts("ft", "arm"), got)
 
 
 def _loop(
@@ -169,7 +170,9 @@ def _wait_for_go(operator_fd: int, sensor: Sensor, status: StatusPipe) -> bool:
     return False
 
 
-def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float, injected: dict[str, int]) -> int:
+def _finish(
+    loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: float, injected: dict[str, int], got: RealtimeFacts
+) -> int:
     counters = sensor.health().counters
     sensor.stop()
     sensor.close()
@@ -180,7 +183,7 @@ def _finish(loop: ControlLoop, sensor: Sensor, status: StatusPipe, rate_hz: floa
         VERDICT_WITHIN_S,
         "finished",
         **figures,
-        loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns),
+        loop=loop.timing.summary(rate_hz, loop.first_ns, loop.last_ns) | {"realtime": msgspec.to_builtins(got)},
         **loop.notes.figures(),
         ft=counters,
         injected=injected,

@@ -12,8 +12,8 @@ from typing import Any, Protocol
 
 from msgspec.structs import astuple, replace
 
+from control.ft_input import ft_input
 from control.laws.law import Law
-from control.loop import ft_input
 from control.notes.run_notes import RunNotes, outcome
 from robot_io.clock import NS_PER_S, SIM_START_NS, SIM_WALL_OFFSET_NS, ClockNs, VirtualClock
 from robot_io.ipc.gate_frame import GateFrame

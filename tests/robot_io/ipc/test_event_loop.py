@@ -244,12 +244,12 @@ def test_a_timer_descriptor_by_itself():
     timer = TimerFd()
     poll = select.poll()
     poll.register(timer.fileno(), select.POLLIN)
-    timer.clear()  # nothing there: no error, no wait
     timer.set_ns(monotonic_ns() + MS)
     assert poll.poll(2000)
-    timer.clear()
-    assert not poll.poll(0)
     timer.set_ns(monotonic_ns() + 3_600_000 * MS)
+    assert not poll.poll(0), "setting it again takes its expiration back"
+    timer.set_ns(monotonic_ns() + MS)
+    assert poll.poll(2000)
     timer.set_ns(0)
     assert not poll.poll(5)
     with pytest.raises(OSError, match="timerfd_settime"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from control.loop import ft_input
+from control.ft_input import ft_input
 from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import NO_ARM, ZERO_JOINTS, ArmState, DeviceHealth, JointState, LinkState, Stamped
 from tools.run.arm_process import publish

@@ -1,0 +1,1 @@
+"""How late a loop wakes up: cyclictest, a bare loop and a complete run, measured in turn."""
