@@ -10,7 +10,8 @@ import difflib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from typing import Any, Literal, TypeVar, get_args, get_origin
+from types import UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
 
@@ -118,7 +119,11 @@ def _problem(kind: Any, value: Any) -> str:
         converted = msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         if choices := _choices(kind):
-            return f"expected one of {', '.join(map(str, choices))}"
+            names = f"expected one of {', '.join(map(str, choices))}"
+            if get_origin(kind) is Literal:
+                return names
+            if isinstance(value, str):
+                return f"{names}, or a list"
         return str(error).replace("Expected", "expected").replace(" - at `$", " at `")
     except OverflowError:
         return "this number is too large"
@@ -126,6 +131,8 @@ def _problem(kind: Any, value: Any) -> str:
 
 
 def _choices(kind: Any) -> tuple[Any, ...]:
+    if get_origin(kind) in (Union, UnionType):
+        return tuple(choice for part in get_args(kind) for choice in _choices(part))
     return get_args(kind) if get_origin(kind) is Literal else ()
 
 

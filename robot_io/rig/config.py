@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
+from msgspec.structs import replace
 
 from robot_io.driver import SensorFacts
 from robot_io.messages import Vector6
@@ -209,6 +210,12 @@ class RigConfig(Table, frozen=True):
     faults: FaultsConfig = FaultsConfig()
 
     @property
+    def push_height_m(self) -> float:
+        """Height of the push above the floor of the simulated world (m)."""
+        said = self.world.floor.push_height_m
+        return max(self.frames.contact_in_base_m[2], 0.0) if said is None else said
+
+    @property
     def scatters(self) -> tuple[bool, bool, bool, bool, bool, bool]:
         """Whether each axis of the sensor scatters at rest: all do, but those of a simulated one without noise.
 
@@ -229,7 +236,10 @@ def load_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConf
     path = files.find(name_or_path)
     data, origins = files.read(path)
     _lay_over(data, origins, overrides)
-    return build(RigConfig, data, origins, str(path))
+    rig = build(RigConfig, data, origins, str(path))
+    # said in every log, so that one without the key is of a program that knew no height
+    floor = replace(rig.world.floor, push_height_m=min(rig.push_height_m, 2.0))
+    return replace(rig, world=replace(rig.world, floor=floor))
 
 
 def origins_of(name_or_path: str | Path, overrides: Sequence[str] = ()) -> toml_text.Origins:

@@ -45,7 +45,11 @@ RENAMED = (
     Renamed("control.controller", "control.law", 3, still_read=True),
 )
 RETIRED = (Retired("base.odometry_rate_hz", 1),)
-EARLIER_DEFAULTS: tuple[EarlierDefault, ...] = (EarlierDefault("world.slip", 0.0, 2),)
+EARLIER_DEFAULTS: tuple[EarlierDefault, ...] = (
+    EarlierDefault("world.slip", 0.0, 2),
+    EarlierDefault("world.floor.push_height_m", 0.0, 4),
+    EarlierDefault("world.floor.turning", "ellipsoid", 4),
+)
 
 
 def name_today(path: tuple[str, ...], where: str) -> tuple[str, ...]:

@@ -9,6 +9,13 @@ from msgspec import Meta
 from robot_io.messages import Vector3, Vector6
 from robot_io.rig.types import InBase, NonNegative, OnRobot2, Positive, Table, Vector2
 
+SupportPoint = tuple[float, float, float]
+"""x (m), y (m) from the middle of the object, and share of the load."""
+Pressure = (
+    Literal["uniform", "rim", "point", "frame", "corners", "centre"]
+    | Annotated[tuple[SupportPoint, ...], Meta(min_length=3, max_length=36)]
+)
+
 
 class SliderConfig(Table, frozen=True):
     """The object in the simulated world. `width_m` is along a rectangle's pushed face; a circle uses `radius_m`."""
@@ -20,21 +27,28 @@ class SliderConfig(Table, frozen=True):
     mass_kg: Positive = 5.1
     floor_friction: Annotated[float, Meta(gt=0, le=2)] = 0.30
     contact_friction: Annotated[float, Meta(ge=0, le=2)] = 0.30
-    pressure: Literal["uniform", "rim", "point"] = "uniform"
-    """`uniform` by the integral in the paper, `rim` at the greatest distance, `point` a tenth of uniform."""
+    pressure: Pressure = "uniform"
+    """How it presses on the floor: `uniform`, even over its area; `centre` and `point`, over a half and a tenth of its
+    lengths; `frame`, along its outline; `corners`; `rim`, the places farthest from its middle; or a list of
+    `[x_m, y_m, share]`, from the middle along the push and to the left."""
     cof_m: Vector2 = (0.0, 0.0)
-    """Centre of friction, from the middle: along the push and to the left (a load that is not in the middle)."""
+    """Centre of friction, from the middle: along the push and to the left (a load that is not in the middle). A list of
+    points has its own."""
 
 
 class FloorConfig(Table, frozen=True):
-    """What the floor of the simulated world does beyond an even ellipsoid of friction; nothing by default."""
+    """The floor of the simulated world."""
 
-    push_height_m: Annotated[float, Meta(ge=0, le=2)] = 0.0
-    """Height of the push above the floor: moves the pressure ahead, by this times the floor's friction."""
-    turning: Literal["ellipsoid", "along-push"] = "ellipsoid"
-    """What resists turning: the greatest torque, or (right while sliding straight) the pressure along the push."""
+    push_height_m: Annotated[float, Meta(ge=0, le=2)] | None = None
+    """Height of the push above the floor: moves the pressure ahead, by this times the floor's friction. By default the
+    height of `frames.contact_in_base_m`; 0 is the paper's world."""
+    turning: Literal["ellipsoid", "along-push", "coulomb"] = "along-push"
+    """What resists turning: the pressure along the push, the greatest torque (`ellipsoid`, the paper's), or Coulomb
+    friction at each support point, the exact sum: slower (docs/simulation-studies.md)."""
     along_over_across: Annotated[float, Meta(ge=0.5, le=2)] = 1.0
     """Friction along the path over friction across it."""
+    support_points: Annotated[int, Meta(ge=9, le=36)] = 16
+    """On about how many points the object stands for `coulomb`; a grid has the largest square below."""
     patch_strength: Annotated[float, Meta(ge=0, le=0.9)] = 0.0
     """How much the friction varies from place to place, relative to its mean; each seed is another floor."""
     patch_m: Annotated[float, Meta(ge=0.01, le=10)] = 0.3

@@ -56,10 +56,10 @@ class PushedSlider:
                 f"a ball of radius {ball_radius_m} m cannot be simulated", do="Give 0 for a point, or at least 0.001 m"
             )
         self.model = model
-        self._solve = _solver(solver)
         self._outline = Outline(model.shape)
         self._radius = ball_radius_m
         self._point_on_polygon = ball_radius_m == 0.0 and bool(self._outline.rows)
+        self._solve = (floor and floor.own_solver(solver, self._point_on_polygon)) or _solver(solver)
         self._piece_m = min(LONGEST_PIECE_M, ball_radius_m / 2) if ball_radius_m else LONGEST_PIECE_M
         self._d, self._f_max, self._mu = model.d_m, model.f_max_N, model.contact_friction
         self._cof_x, self._cof_y = model.cof_m

@@ -1,23 +1,27 @@
-"""Floor effects on a pushed slider beyond the paper's ellipsoid with a fixed centre.
+"""The floor under a pushed slider, beyond the paper's ellipsoid with a fixed centre.
 
-Four effects, each off by default: the pressure's centre runs ahead of the centre of mass when the push is above the
-floor; a slider pushed straight resists turning by the pressure's spread along the push; the floor resists more along
-one direction; and its friction varies from place to place.
+Four effects, each off unless given: the pressure's centre runs ahead of the centre of mass when the push is above the
+floor; what resists turning is the pressure's spread along the push, or Coulomb friction point by point, instead of the
+ellipsoid; the floor resists more along one direction; and its friction varies from place to place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import cos, hypot, inf, sin, sqrt
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
 from robot_io.errors import ConfigError
 from sim_backend.physics.floor_patches import FrictionField
 from sim_backend.physics.shapes import Circle, Moment, Point, Shape
-from sim_backend.physics.slider import POINT_SHARE_OF_UNIFORM, Pressure, SliderModel
-from sim_backend.physics.slider_exact import Grain
+from sim_backend.physics.slider import Pressure, SliderModel
+from sim_backend.physics.slider_exact import ContactSolver, Grain
+from sim_backend.physics.support import MOST_POINTS, SCALE_OF_UNIFORM, SUPPORT_POINTS, centre_of, support_points
+
+if TYPE_CHECKING:
+    from sim_backend.physics.coulomb.floor import CoulombFloor
 
 Grip = tuple[float, float, float, float, Grain | None]
 """Current centre of friction x, y (m, BODY), d (m), f_max (N) and grain (BODY)."""
@@ -33,24 +37,35 @@ class FloorEffects(msgspec.Struct, frozen=True):
 
     shift_m: how far the centre of friction runs ahead along the push force: floor friction times push height.
     turning: `ellipsoid` takes d from the greatest torque (right for spinning on the spot); `along-push` from the
-    pressure's mean square distance along the push (right for small turns while sliding straight).
+    pressure's mean square distance along the push (right for small turns while sliding straight); `coulomb` is the sum
+    over support points (right for both).
     along_over_across: friction along `grain_rad` (WORLD) over friction across it; f_max is the one along.
     patch_strength (0 to below 1), patch_m, seed: see `FrictionField`.
     """
 
     shift_m: float = 0.0
-    turning: Literal["ellipsoid", "along-push"] = "ellipsoid"
+    turning: Literal["ellipsoid", "along-push", "coulomb"] = "ellipsoid"
     along_over_across: float = 1.0
     grain_rad: float = 0.0
     patch_strength: float = 0.0
     patch_m: float = 0.3
     seed: int = 0
 
+    @property
+    def has_none(self) -> bool:
+        """Return whether this is the paper's floor."""
+        return (self.shift_m, self.turning, self.along_over_across, self.patch_strength) == (0.0, "ellipsoid", 1.0, 0.0)
+
 
 class Floor:
-    """The floor's grip on a slider at a pose. Raises ConfigError for effects that are impossible for this slider."""
+    """The floor's grip on a slider at a pose. Raises ConfigError for effects that are impossible for this slider.
 
-    def __init__(self, model: SliderModel, pressure: Pressure, effects: FloorEffects) -> None:
+    points: about how many support points stand for the pressure where `turning` is `coulomb`.
+    """
+
+    def __init__(
+        self, model: SliderModel, pressure: Pressure, effects: FloorEffects, points: int = SUPPORT_POINTS
+    ) -> None:
         if not 0 <= effects.shift_m < _room(model.shape, model.cof_m):
             raise ConfigError(
                 f"a slider whose pressure moves {effects.shift_m:.3g} m ahead tips over", where="slider",
@@ -64,21 +79,52 @@ class Floor:
         self._effects = effects
         self._moment = _pressure_moment(model.shape, pressure) if effects.turning == "along-push" else None
         self.follows_push = effects.shift_m > 0 or self._moment is not None
+        self.coulomb: CoulombFloor | None = None
         self._patches: Callable[[float, float, float, float], tuple[float, float, float, float]] | None = None
+        field = None
         if effects.patch_strength > 0:
-            points = model.shape.rim_points() if pressure == "rim" else model.shape.grid_points(SUPPORT_ACROSS)
-            self._patches = _Patches(
-                model, points, FrictionField(effects.patch_strength, effects.patch_m, effects.seed)
+            field = FrictionField(effects.patch_strength, effects.patch_m, effects.seed)
+        if effects.turning == "coulomb":
+            from sim_backend.physics.coulomb.floor import CoulombFloor  # numba takes long to load: only on request
+
+            leaning_to = None if _near(model.cof_m, model.shape.centroid_m) else model.cof_m
+            own = support_points(model.shape, pressure, points, leaning_to if isinstance(pressure, str) else None)
+            self.coulomb = CoulombFloor(own, effects.shift_m, field)
+        elif field is not None:
+            sampled = model.shape.rim_points() if pressure == "rim" else model.shape.grid_points(SUPPORT_ACROSS)
+            self._patches = _Patches(model, sampled, field)
+
+    def own_solver(self, asked: str, point_on_polygon: bool) -> ContactSolver | None:
+        """Return what solves a contact on this floor, None where an ellipsoid's solvers do.
+
+        asked: the solver of the rig. Raises ConfigError for what Coulomb friction is not for.
+        """
+        if self.coulomb is None:
+            return None
+        if asked != "exact":
+            raise ConfigError(
+                "the paper's program has an ellipsoid of friction, not support points",
+                where="world.solver",
+                do='Leave solver = "exact" with turning = "coulomb"',
             )
+        if point_on_polygon:
+            raise ConfigError("a point pusher is not for Coulomb friction", do="Give the ball a radius")
+        return self.coulomb.contact
 
     def grip(self, x: float, y: float, cos_: float, sin_: float, push_x: float, push_y: float) -> Grip:
         """Return the grip on the slider at a pose (m; cosine, sine of its heading), pushed along a BODY direction."""
         model, effects = self._model, self._effects
+        if self.coulomb is not None:
+            self.coulomb.load(x, y, cos_, sin_, push_x, push_y)
+            return (*self.coulomb.centre_m, model.d_m, model.f_max_N, self._grain(cos_, sin_))
         cof_x, cof_y = model.cof_m
         d, f_max = model.d_m, model.f_max_N
         if self._moment is not None:
             xx, xy, yy = self._moment
-            d = sqrt(xx * push_x * push_x + 2.0 * xy * push_x * push_y + yy * push_y * push_y)
+            dd = xx * push_x * push_x + 2.0 * xy * push_x * push_y + yy * push_y * push_y
+            x0, y0 = model.shape.centroid_m
+            lean = effects.shift_m + (cof_x - x0) * push_x + (cof_y - y0) * push_y
+            d = sqrt(max(dd - lean * lean, dd * 2 / 3))
         if self._patches is not None:
             shift_x, shift_y, load, spread = self._patches(x, y, cos_, sin_)
             cof_x, cof_y, f_max, d = cof_x + shift_x, cof_y + shift_y, f_max * load, d * spread
@@ -134,19 +180,22 @@ class _Patches:
 
 
 def _pressure_moment(shape: Shape, pressure: Pressure) -> Moment:
-    """Return the mean of x^2, xy, y^2 of a pressure distribution about the shape's centroid (m^2)."""
-    if pressure == "rim":
-        x, y = shape.centroid_m
-        points = [(px - x, py - y) for px, py in shape.rim_points()]
-        n = len(points)
-        return (
-            sum(p[0] ** 2 for p in points) / n,
-            sum(p[0] * p[1] for p in points) / n,
-            sum(p[1] ** 2 for p in points) / n,
-        )
-    xx, xy, yy = shape.second_moment_m2()
-    scale = 1.0 if pressure == "uniform" else POINT_SHARE_OF_UNIFORM**2
-    return (xx * scale, xy * scale, yy * scale)
+    """Return the mean of x^2, xy, y^2 of a pressure distribution about its centre (m^2)."""
+    if isinstance(pressure, str) and pressure in SCALE_OF_UNIFORM:
+        xx, xy, yy = shape.second_moment_m2()
+        scale = SCALE_OF_UNIFORM[pressure] ** 2
+        return (xx * scale, xy * scale, yy * scale)
+    points = support_points(shape, pressure, MOST_POINTS)
+    x0, y0 = centre_of(points)
+    return (
+        sum(w * (x - x0) ** 2 for x, _, w in points),
+        sum(w * (x - x0) * (y - y0) for x, y, w in points),
+        sum(w * (y - y0) ** 2 for _, y, w in points),
+    )
+
+
+def _near(one: Point, other: Point) -> bool:
+    return hypot(one[0] - other[0], one[1] - other[1]) < 1e-12
 
 
 def _room(shape: Shape, cof: Point) -> float:

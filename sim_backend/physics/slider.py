@@ -7,18 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 from robot_io.errors import ConfigError
 from sim_backend.physics.shapes import Circle, ConvexPolygon, Point, Rectangle, Shape, positive
+from sim_backend.physics.support import MOST_POINTS, SCALE_OF_UNIFORM, Pressure, centre_of, support_points
 
 __all__ = ["Circle", "ConvexPolygon", "Pressure", "Rectangle", "Shape", "SliderModel", "pressure_distance_m"]
 
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
-POINT_SHARE_OF_UNIFORM = 0.1
-"""`point` pressure: a tenth of the uniform distribution's torsional load (the paper's Table I, smallest value)."""
-
-Pressure = Literal["uniform", "rim", "point"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +56,12 @@ class SliderModel:
         pressure: Pressure = "uniform",
         cof_m: Point | None = None,
     ) -> SliderModel:
-        """Return the model of a body of `mass_kg` on a floor; the centre of friction is the centroid unless given."""
+        """Return the model of a body of `mass_kg` on a floor.
+
+        The centre of friction is that of the pressure (a named one's is the centroid) unless given.
+        """
         f_max = floor_friction * mass_kg * STANDARD_GRAVITY_M_PER_S2
-        cof = shape.centroid_m if cof_m is None else cof_m
+        cof = cof_m or (shape.centroid_m if isinstance(pressure, str) else centre_of(support_points(shape, pressure)))
         tau_max = f_max * pressure_distance_m(shape, pressure, cof)
         return cls(shape, f_max, tau_max, contact_friction, cof)
 
@@ -70,13 +69,16 @@ class SliderModel:
 def pressure_distance_m(shape: Shape, pressure: Pressure, cof_m: Point | None = None) -> float:
     """Return d = tau_max / f_max (m) of a pressure distribution about the centre of friction (default: centroid).
 
-    `uniform`: mean distance of the support area (the paper's integral); `rim`: all pressure at the greatest
-    distance; `point`: a tenth of uniform. Raises ConfigError if the centre of friction lies outside.
+    `uniform`: mean distance of the support area (the paper's integral); `centre`, `point`: a half and a tenth of that;
+    `rim`: all pressure at the greatest distance; any other: the mean distance of its support points. Raises ConfigError
+    if the centre of friction lies outside.
     """
     cof = shape.centroid_m if cof_m is None else cof_m
     if not (all(map(math.isfinite, cof)) and shape.contains(cof)):
         raise ConfigError(f"the centre of friction {cof} lies outside the slider", where="slider")
     if pressure == "rim":
         return shape.greatest_distance_m(cof)
-    uniform = shape.mean_distance_m(cof)
-    return uniform if pressure == "uniform" else POINT_SHARE_OF_UNIFORM * uniform
+    if isinstance(pressure, str) and pressure in SCALE_OF_UNIFORM:
+        return SCALE_OF_UNIFORM[pressure] * shape.mean_distance_m(cof)
+    points = support_points(shape, pressure, MOST_POINTS, cof)
+    return math.fsum(w * math.hypot(x - cof[0], y - cof[1]) for x, y, w in points)

@@ -7,13 +7,15 @@ import random
 
 import msgspec
 
+from robot_io.errors import ConfigError
 from robot_io.geometry import StraightPath, rotated
 from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
-from robot_io.rig.world import FloorConfig, SliderConfig
+from robot_io.rig.world import SliderConfig
 from sim_backend.physics.floor import Floor, FloorEffects
 from sim_backend.physics.shapes import Circle, Rectangle
 from sim_backend.physics.slider import SliderModel
+from sim_backend.physics.support import SupportPoint, support_points
 from sim_backend.world.truth import true_frames
 
 
@@ -26,28 +28,43 @@ class Scene(msgspec.Struct, frozen=True):
 
 def slider_model(config: SliderConfig) -> SliderModel:
     """Return the slider of a rig file. Raises ConfigError for an impossible one."""
-    shape: Circle | Rectangle
-    if config.shape == "circle":
-        shape = Circle(config.radius_m)
-    else:
-        shape = Rectangle(config.length_m, config.width_m)
+    own_points = not isinstance(config.pressure, str)
+    if own_points and config.cof_m != (0.0, 0.0):
+        raise ConfigError(
+            "`world.slider.cof_m` is for a named pressure: a list of support points has its own centre",
+            where="slider",
+            do="Leave cof_m out, or change the shares",
+        )
     return SliderModel.from_mass(
-        shape,
+        shape_of(config),
         mass_kg=config.mass_kg,
         floor_friction=config.floor_friction,
         contact_friction=config.contact_friction,
         pressure=config.pressure,
-        cof_m=config.cof_m,
+        cof_m=None if own_points else config.cof_m,
     )
+
+
+def shape_of(config: SliderConfig) -> Circle | Rectangle:
+    """Return the shape of a rig's slider. Raises ConfigError for an impossible one."""
+    return Circle(config.radius_m) if config.shape == "circle" else Rectangle(config.length_m, config.width_m)
+
+
+def support_of(rig: RigConfig) -> tuple[SupportPoint, ...]:
+    """Return the points on which the rig's slider stands at rest: x, y (m, BODY frame), share of the load.
+
+    Raises ConfigError when it cannot stand on them.
+    """
+    slider = rig.world.slider
+    cof = slider.cof_m if slider.cof_m != (0.0, 0.0) else None
+    return support_points(shape_of(slider), slider.pressure, rig.world.floor.support_points, cof)
 
 
 def floor_of(rig: RigConfig, seed: int) -> Floor | None:
     """Return the rig's floor effects beyond the slider's ellipsoid, or None without any. Raises ConfigError."""
-    config = rig.world.floor
-    if config == FloorConfig():
-        return None
+    config, slider = rig.world.floor, rig.world.slider
     effects = FloorEffects(
-        shift_m=rig.world.slider.floor_friction * config.push_height_m,
+        shift_m=slider.floor_friction * rig.push_height_m,
         turning=config.turning,
         along_over_across=config.along_over_across,
         grain_rad=math.radians(rig.path.direction_deg),
@@ -55,7 +72,9 @@ def floor_of(rig: RigConfig, seed: int) -> Floor | None:
         patch_m=config.patch_m,
         seed=seed,
     )
-    return Floor(slider_model(rig.world.slider), rig.world.slider.pressure, effects)
+    if effects.has_none:
+        return None
+    return Floor(slider_model(slider), slider.pressure, effects, config.support_points)
 
 
 def place(rig: RigConfig, seed: int) -> Scene:

@@ -26,14 +26,15 @@ from sim_backend.physics.gain_limits import (
     offset_per_degree_m,
     offset_per_newton_m,
 )
-from sim_backend.physics.slider import Circle, Pressure, Rectangle
+from sim_backend.physics.slider import Circle, Rectangle
+from sim_backend.physics.support import PressureName
 from tools.sweep.tune_map import PRESETS
 from tools.terminal.arguments import named_path, number, pair
 
 Choice = TypeVar("Choice", bound=str)
 TUNED = ("force", "force-integral")
 SHAPES: tuple[Literal["box", "circle"], ...] = ("box", "circle")
-PRESSURES: tuple[Pressure, ...] = ("uniform", "rim", "point")
+PRESSURES: tuple[PressureName, ...] = ("uniform", "rim", "point")
 MAP_K_F = tuple(i / 100 for i in range(2, 61, 2))
 SHARE = 0.5
 """The recommended k_y is this share of its limit: twice the gain is still stable."""

@@ -11,18 +11,19 @@ import argparse
 import json
 import math
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from tools import cli
 from tools.study.results import Runs, groups, number, read_runs
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "simulation-studies.md"
 SWEEP = "paper-sweep"
+PUSH = "import sys; from robot_io._entry import main; sys.exit(main())"
 Rows = list[dict[str, str]]
 Cell = Callable[[Rows], str]
 LAW, TURNING, MASS = "control.law", "world.floor.turning", "world.slider.mass_kg"
@@ -118,7 +119,7 @@ def main(argv: Sequence[str]) -> int:
     for name in args.only or (*TABLES, SWEEP):
         out = args.out / name
         words = ["sweep", "paper"] if name == SWEEP else ["study", name]
-        if code := cli.main([*words, "--out", str(out), "--resume"]):
+        if code := subprocess.run([sys.executable, "-c", PUSH, *words, "--out", str(out), "--resume"]).returncode:
             return code
         if name == SWEEP:
             lines = sweep_table(json.loads((out / "summary.json").read_text(encoding="utf-8")))

@@ -52,7 +52,7 @@ def rig_bodies(rig: RigConfig) -> list[PushedBody]:
     """Return the sliders of `[sliders]`, and the simulated one if there is one."""
     world, pressure = rig.world, rig.sliders.pressure
     effects = FloorEffects(
-        shift_m=world.slider.floor_friction * world.floor.push_height_m,
+        shift_m=world.slider.floor_friction * rig.push_height_m,
         turning=world.floor.turning,
         along_over_across=world.floor.along_over_across,
     )

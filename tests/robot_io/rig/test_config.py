@@ -29,6 +29,8 @@ DIMENSIONLESS = {
     "base_phase": "a part of a period",
     "along_over_across": "a ratio of frictions",
     "patch_strength": "a part of the mean",
+    "pressure": "a name, or points in m, m and a share",
+    "support_points": "a number of points",
     "base_from_sensor": "a rotation matrix",
     "base_from_marker": "m, m, rad: in the docstring",
     "marker_offset": "m, m, rad: in the docstring",

@@ -1,0 +1,1 @@
+"""A pushed slider on its support points: Coulomb friction at each, summed exactly instead of by an ellipsoid."""
