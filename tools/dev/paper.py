@@ -92,7 +92,7 @@ def study_table(runs: Runs, matrix: Matrix) -> list[str]:
 
 def sweep_table(summary: dict[str, dict[str, dict[str, object]]]) -> list[str]:
     """Return the table of the paper's sweep: how many converged, and how far out they were."""
-    lines = _head(("shape", "pushes", "converged", "end |y|, median", "end |y|, largest", "largest |y| on the way"))
+    lines = _head(("shape", "pushes", "converged", "offset at the end, median", "largest", "largest on the way"))
     for shape, found in summary["shapes"].items():
         end, most = (json.loads(json.dumps(found[key])) for key in ("final_abs_y_m", "max_abs_y_m"))
         cells = (shape, found["lanes"], found["converged"], _mm(end["median"]), _mm(end["max"]), f"{most['max']:.2f} m")
