@@ -31,9 +31,9 @@ WIRE_KINDS: dict[str, dict[str, tuple[float, ...]]] = {
         "safeguard-stop": (), "brakes-on": (), "paused-program": (), "turned": (1.0,), "inputs-taken": (),
     },
     "base": {
-        "silent": (), "lag": (0.2,), "no-rosapi": (), "command-type": (), "pose-type": (), "no-listener": (),
-        "second-publisher": (), "second-client": (), "commanded": (0.1,), "clock": (5.0,), "frame": (),
-        "battery": (21.0,),
+        "silent": (), "lag": (0.2,), "no-rosapi": (), "cold": (2.0,), "slow-answers": (0.5,), "command-type": (),
+        "pose-type": (), "no-listener": (), "second-publisher": (), "second-client": (), "commanded": (0.1,),
+        "clock": (5.0,), "frame": (), "battery": (21.0,),
     },
 }  # fmt: skip
 """What only the wire has: for each kind its value where none is given; no value where it takes none."""

@@ -28,6 +28,7 @@ from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.ur10.standalone import StillArm
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
+from tools.run.emulated import modelled
 from tools.run.emulated.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
 from tools.run.emulated.hands import Hands
 from tools.terminal.arguments import SEED, name_or_path, number
@@ -42,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the devices and their flags."""
     devices = parser.add_subparsers(dest="device", required=True, metavar="DEVICE")
 
-    ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty")
+    ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty", description=modelled.FT300)
     wrench = "FX,FY,FZ,MX,MY,MZ"
     ft.add_argument("--wrench", default="0,0,0,0,0,0", metavar=wrench, help="N, N*m; as in --wrench=-10,0,0,0,0,0")
     ft.add_argument(
@@ -59,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ur.add_argument("--host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST}); one robot per address")
     ur.set_defaults(open_devices=_open_ur10)
 
-    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server")
+    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server", description=modelled.RIDGEBACK)
     base.add_argument("--host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
     base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")
     base.set_defaults(open_devices=_open_ridgeback)

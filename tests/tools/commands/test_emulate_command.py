@@ -48,6 +48,17 @@ def read_line(child, within_s=20.0):
     return line
 
 
+@pytest.mark.parametrize("device", ["ft300", "ridgeback"])
+def test_the_help_says_what_is_modelled_and_what_is_not(device, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["emulate", device, "--help"])
+    assert ended.value.code == 0
+    told = capsys.readouterr().out
+    assert "\nmodelled: " in told
+    assert "\nnot modelled: " in told
+    assert max(map(len, told.splitlines())) <= 80
+
+
 def registers_of(port):
     sensor = minimalmodbus.Instrument(port, 9)
     sensor.serial.baudrate = 19200

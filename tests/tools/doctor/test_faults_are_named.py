@@ -67,6 +67,8 @@ BASE = [
     (["base.lag=0.2"], "base.round-trip", "warning"),
     (["base.lag=0.4"], "base.round-trip", "failed"),
     (["base.no-rosapi"], "base.command-type", "warning"),
+    (["base.cold=1.5"], "base.command-type", "ok"),
+    (["base.slow-answers=0.2"], "base.round-trip", "warning"),
     (["base.command-type"], "base.command-type", "failed"),
     (["base.no-listener"], "base.command-listener", "failed"),
     (["base.command.ignored at 0 s"], "base.command-listener", "failed"),
