@@ -9,7 +9,7 @@ DEMO := runs/demo-$(shell date +%Y%m%d-%H%M%S)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all check mutants clean runtime dev
+.PHONY: help demo test test-all check mutants paper clean runtime dev
 
 help: ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -33,6 +33,9 @@ check: dev ## ruff, mypy strict and the import contracts, no tests
 
 mutants: dev ## change the code one place at a time and list what no test notices (SINCE=<commit>: changed lines only)
 	$(BIN)/python -m tools.dev.mutants $(if $(SINCE),--since $(SINCE))
+
+paper: dev ## run the shipped studies and the paper's sweep, and write the tables in docs that come of them anew
+	$(BIN)/python -m tools.dev.paper --out studies/paper-$(shell git rev-parse --short HEAD)
 
 clean: ## remove the environment and all caches (runs/ stays)
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .mutants

@@ -85,6 +85,21 @@ COMMANDS = {
         "many simulated pushes, and the paper's figures",
         ("push sweep --out sweeps/paper", "push sweep my-grid.toml --out sweeps/mine --resume"),
     ),
+    "study": Command(
+        "tools.commands.study",
+        "many whole pushes over settings, laws and seeds, with tables and figures",
+        ("push study floors --out studies/floors", "push study my-study.toml --out studies/mine --resume"),
+    ),
+    "study show": Command(
+        "tools.study.show",
+        "the runs of a study, filtered, sorted or summed up",
+        ("push study show studies/mine --where verdict!=done", "push study show studies/mine --by law"),
+    ),
+    "study rerun": Command(
+        "tools.study.rerun",
+        "run a study again: the same bytes, or what differs",
+        ("push study rerun studies/mine", "push study rerun studies/mine --json"),
+    ),
     "tune": Command(
         "tools.commands.tune", "recommend gains, with a map of the stable ones", ("push tune", "push tune --json")
     ),

@@ -38,6 +38,8 @@ def whole_parser() -> argparse.ArgumentParser:
         if group and group not in groups:
             groups[group] = commands.add_parser(group, help=f"{group} ...").add_subparsers()
         parser = (groups[group] if group else commands).add_parser(word, help=command.summary)
+        if any(other.startswith(f"{name} ") for other in COMMANDS):  # its second word, or its own arguments
+            groups[name] = parser.add_subparsers()
         importlib.import_module(command.module).add_arguments(parser)
         _complete_paths(parser)
     return root

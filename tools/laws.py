@@ -11,6 +11,7 @@ import hashlib
 import importlib
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -47,10 +48,14 @@ class LawAnswer(msgspec.Struct, frozen=True):
     settings: dict[str, Any]
 
 
-def with_law(rig: RigConfig, folder: str) -> RigConfig:
+LawQuestion = Callable[[ControlConfig, str], LawAnswer]
+
+
+def with_law(rig: RigConfig, folder: str, query: LawQuestion | None = None) -> RigConfig:
     """Return the rig with the settings of its law filled in, and what a law of one's own declares.
 
-    Raises ConfigError for a law that does not exist or cannot be used, and for settings that are not its own.
+    query: asks a law of one's own; `query_law` by default. Raises ConfigError for a law that does not exist or cannot
+    be used, and for settings that are not its own.
     """
     control = rig.control
     if is_shipped(control.law):
@@ -58,7 +63,7 @@ def with_law(rig: RigConfig, folder: str) -> RigConfig:
         return replace(rig, control=replace(control, law_settings=msgspec.to_builtins(found), law_facts=LawFacts()))
     if ":" not in control.law:
         raise _unknown(control.law)
-    answer = query_law(control, folder)
+    answer = (query or query_law)(control, folder)
     return replace(rig, control=replace(control, law_settings=answer.settings, law_facts=answer.facts))
 
 

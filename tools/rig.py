@@ -15,21 +15,22 @@ from robot_io.rig.fault_words import parse_fault
 from robot_io.rig.files import shipped_rigs
 from robot_io.rig.types import Matrix3
 from tools.kinds import is_shipped, query_kinds
-from tools.laws import with_law
+from tools.laws import LawQuestion, with_law
 
 ROTATION_TOLERANCE = 1e-6
 LONGEST_NAME = 64
 
 
-def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigConfig:
+def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = (), query: LawQuestion | None = None) -> RigConfig:
     """Load a rig with its overrides, add what its kinds declare, and check what its types cannot express.
 
-    Raises ConfigError (and UsageError for an override that is not `key=value`).
+    query: asks a law of one's own what it declares, where many rigs have the same. Raises ConfigError (and UsageError
+    for an override that is not `key=value`).
     """
     from safety import limits
 
     folder = folder_of(name_or_path)
-    rig, problems = _with_kinds(with_law(load_rig(name_or_path, overrides), folder), folder)
+    rig, problems = _with_kinds(with_law(load_rig(name_or_path, overrides), folder, query), folder)
     rig, more = _with_tool_force(rig)
     problems += more + _name_problems(rig) + _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
     check_faults(rig)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -54,7 +55,7 @@ class _Reader:
 
     def read(self, kind: type[msgspec.Struct], data: Mapping[str, Any], path: KeyPath) -> dict[str, Any]:
         """Return the keys of the table `path` that are right."""
-        fields = {field.name: field for field in msgspec.structs.fields(kind)}
+        fields = _fields_of(kind)
         built: dict[str, Any] = {}
         for key, value in data.items():
             here = (*path, key)
@@ -94,6 +95,12 @@ class _Reader:
             if found:
                 return f", did you mean {' or '.join([', '.join(found[:-1]), found[-1]] if found[1:] else found)}?"
         return _nearest(path[-1], known)
+
+
+@cache
+def _fields_of(kind: type[msgspec.Struct]) -> dict[str, msgspec.structs.FieldInfo]:
+    """Return the fields of a table by name, looked up once: msgspec reads every annotation anew."""
+    return {field.name: field for field in msgspec.structs.fields(kind)}
 
 
 def _names(kind: type[msgspec.Struct], path: KeyPath = ()) -> Iterator[KeyPath]:

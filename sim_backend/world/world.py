@@ -30,19 +30,15 @@ STALL_STEPS = 30
 WorldRecord = WorldStart | WorldCommand | WorldState | WorldStall
 
 
-def _ignore(record: WorldRecord) -> None:
-    """Discard the record."""
-
-
 class World:
     """Implements FtSource, ArmSource and BaseSource over one slider world.
 
     rig: its `world`, `frames` and `path` tables are used. start_ns: origin of the grid (CLOCK_MONOTONIC or
-    virtual). on_record: called with each record, in order.
+    virtual). on_record: called with each record, in order; without it none is made.
     """
 
     def __init__(
-        self, rig: RigConfig, seed: int, start_ns: int, on_record: Callable[[WorldRecord], None] = _ignore
+        self, rig: RigConfig, seed: int, start_ns: int, on_record: Callable[[WorldRecord], None] | None = None
     ) -> None:
         scene = place(rig, seed)
         self.seed = seed
@@ -66,8 +62,9 @@ class World:
         self._steps = 0
         self._on_record = on_record
         self.stalls = 0
-        on_record(WorldStart(seed, start_ns))
-        on_record(self._state())
+        if on_record is not None:
+            on_record(WorldStart(seed, start_ns))
+            on_record(self._state())
 
     @property
     def now_ns(self) -> int:
@@ -79,7 +76,8 @@ class World:
         due = (t_ns - self._start_ns) // GRID_NS - self._steps
         if due > STALL_STEPS:
             self.stalls += 1
-            self._on_record(WorldStall(self.now_ns, due))
+            if self._on_record is not None:
+                self._on_record(WorldStall(self.now_ns, due))
         for _ in range(due):
             self._step()
 
@@ -114,12 +112,14 @@ class World:
     def command_base(self, twist: BodyTwist, arrival_ns: int) -> None:
         """See `BaseSource.command_base`; it acts at the first base tick that is not before its arrival."""
         counted_ns = self._plant.command(twist, arrival_ns)
-        self._on_record(WorldCommand(counted_ns, twist, False, True))
+        if self._on_record is not None:
+            self._on_record(WorldCommand(counted_ns, twist, False, True))
 
     def set_drivers(self, active: bool, at_ns: int) -> None:
         """See `BaseSource.set_drivers`."""
         counted_ns = self._plant.set_drivers(active, at_ns)
-        self._on_record(WorldCommand(counted_ns, BodyTwist(), True, active))
+        if self._on_record is not None:
+            self._on_record(WorldCommand(counted_ns, BodyTwist(), True, active))
 
     def press(self, force: Vector3, for_s: float, at_ns: int) -> None:
         """Press on the ball by hand, with a force in N (BODY frame) from `at_ns` on."""
@@ -139,7 +139,7 @@ class World:
         ball = point_outside(*self._plant.place, *self._reach)
         self._contact = self._slider.step(self._ball, ball, GRID_NS * 1e-9)
         self._ball = ball
-        if self._steps % STATE_EVERY_STEPS == 0:
+        if self._on_record is not None and self._steps % STATE_EVERY_STEPS == 0:
             self._on_record(self._state())
 
     def _state(self) -> WorldState:

@@ -28,14 +28,6 @@ class Course(NamedTuple):
     faults: tuple[str, ...]
 
 
-class _NoLog:
-    def record(self, kind: int, time_ns: int, payload: bytes) -> None:
-        pass
-
-    def tick(self, time_ns: int, payload: bytes, tick: object) -> None:
-        pass
-
-
 def push(law: str, seed: int, distance_m: float = 20.0, settings: tuple[str, ...] = ()) -> Course:
     """Push the default object with an error of 1 degree and of 0.12 N."""
     draw = random.Random(f"signs-{seed}")
@@ -46,7 +38,7 @@ def push(law: str, seed: int, distance_m: float = 20.0, settings: tuple[str, ...
     lateral = tuple(rows[1][i] * bias for i in range(3))  # along BODY y, in the SENSOR frame
     word = f"ft.wrong={','.join(f'{value:.4f}' for value in lateral)} at {rig.ft.tare_s + AFTER_TARE_S:.1f} s"
     rig = replace(rig, faults=replace(rig.faults, inject=(word,)))
-    run = Lockstep(rig, seed, _NoLog())
+    run = Lockstep(rig, seed, None)
     at_6_m = [math.nan]
 
     def look(inp: Any, state: Any, output: Any) -> None:

@@ -25,6 +25,8 @@ from tools.dev.fault_table import page as faults_page
 from tools.dev.fault_table import table
 from tools.dev.rig_reference import reference
 from tools.rig import resolve_rig
+from tools.study.pushes import pushes_of
+from tools.study.study_file import read_study
 from tools.sweep.grid import load_grid
 
 ROOT = Path(__file__).parents[2]
@@ -76,6 +78,11 @@ def test_the_grid_of_the_page_is_good(tmp_path):
     [text] = examples("docs/simulation-studies.md", "name = ")
     (tmp_path / "example.toml").write_text(text)
     assert len(load_grid(tmp_path / "example.toml", {}).cases) == 3 * 3 * 100
+
+
+def test_the_study_of_the_page_is_good():
+    [text] = examples("docs/simulation-studies.md", "[study]")
+    assert len(pushes_of(read_study(text, "example.toml", str(ROOT)))) == 20 * 3 * 2
 
 
 def readme_commands():

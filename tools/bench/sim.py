@@ -112,6 +112,9 @@ def time_tick_parts(folder: Path) -> dict[str, float]:
     def simulate() -> None:
         Lockstep(rig, 0, RecordedRun()).run(lambda *_: None)
 
+    def without_log() -> None:
+        Lockstep(rig, 0, None).run(lambda *_: None)
+
     def fold() -> None:
         state = TickState()
         for tick in ticks:
@@ -143,6 +146,9 @@ def time_tick_parts(folder: Path) -> dict[str, float]:
     figures["write_ns_per_tick"] = _best_ns(derive_and_write) / len(ticks) - figures["derive_ns_per_tick"]
     # The complete tick without its log: devices, world, gate, fold and the encoding of every record.
     figures["simulate_ns_per_tick"] = _best_ns(simulate) / len(ticks)
+    # The same without any record, as `push study` runs it.
+    figures["without_log_ns_per_tick"] = _best_ns(without_log) / len(ticks)
+    figures["times_real_time_without_log"] = NS_PER_S / rig.loop.rate_hz / figures["without_log_ns_per_tick"]
     return figures
 
 

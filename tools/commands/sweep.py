@@ -12,14 +12,14 @@ from robot_io.errors import UsageError
 from tools.parallel.work import Work, add_work_arguments, run_parts, working
 from tools.sweep.grid import check_law, load_grid
 from tools.sweep.paper import paper_study
-from tools.sweep.plan import Plan, hardware_plan, lanes_plan
+from tools.sweep.plan import Plan, lanes_plan
 from tools.terminal.arguments import name_or_path, named_path, number, pair
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "grid", nargs="?", type=name_or_path, default="paper", help="paper (default), hardware, or a TOML grid file"
+        "grid", nargs="?", type=name_or_path, default="paper", help="paper (default), or a TOML grid file"
     )
     parser.add_argument(
         "--out", type=named_path, metavar="DIR", help="folder for the results (default: sweeps/NAME-TIME)"
@@ -62,7 +62,11 @@ def run(args: argparse.Namespace) -> int:
 def _plan(args: argparse.Namespace) -> Plan:
     gains = args.gains
     if args.grid == "hardware":
-        return hardware_plan(gains, args.dt, bool(args.open_loop or args.law))
+        raise UsageError(
+            "the experiment is a study of whole pushes now",
+            where="push sweep hardware",
+            do="Run `push study experiment-box` and `push study experiment-barrel`",
+        )
     changes: dict[str, Any] = {"k_f": gains[0], "k_y_rad_per_m": gains[1]} if gains else {}
     if args.open_loop and args.law not in (None, "open-loop"):
         raise UsageError("--open-loop and --law name two laws", where="push sweep", do="Give one of them")

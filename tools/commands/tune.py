@@ -154,7 +154,7 @@ def check_law(law: str) -> None:
     raise UsageError(
         f"`push tune` has limits for {' and '.join(TUNED)} only, not for `{law}`",
         where="--law",
-        do="Use push study, which runs any law",
+        do="Use `push study`, which runs any law",
     )
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from robot_io.messages import BodyTwist
 from robot_io.rig.config import RigConfig
-from robot_io.tick import ControlTick, Phase, TickInput, TickOutput, TickState
+from robot_io.tick import Phase, TickInput, TickOutput, TickState
 from safety.gate import LATCH_FAULT
 from tools.faults.scenario import Moment, Scenario, at
 from tools.places.saved_tare import SavedTare
@@ -48,16 +48,6 @@ class LockstepRound(NamedTuple):
     exit_code: int
 
 
-class NoLog:
-    """Keeps nothing."""
-
-    def record(self, kind: int, time_ns: int, payload: bytes) -> None:
-        """Forget it."""
-
-    def tick(self, time_ns: int, payload: bytes, tick: ControlTick | None) -> None:
-        """Forget it."""
-
-
 class _FaultyCore:
     """The core with the scenario's facts of the host, and its defects, from a tick on."""
 
@@ -80,7 +70,7 @@ class FaultyLockstep(Lockstep):
     """A lockstep run under a scenario."""
 
     def __init__(self, rig: RigConfig, seed: int, scenario: Scenario, from_tick: int) -> None:
-        super().__init__(rig, seed, NoLog(), saved=usual_tare(seed) if scenario.in_contact else None)
+        super().__init__(rig, seed, None, saved=usual_tare(seed) if scenario.in_contact else None)
         self.safety = self._core.safety
         self._core = _FaultyCore(self._core, scenario, from_tick)  # type: ignore[assignment]
         self._scenario = scenario
@@ -162,14 +152,14 @@ def reference(settings: tuple[str, ...], seed: int) -> tuple[Seen, ...]:
             Seen(state.control.phase, size(output.command_body), output.mode, output.faults, inp.base.pose.y, True)
         )
 
-    Lockstep(_rig(settings), seed, NoLog()).run(on_tick)
+    Lockstep(_rig(settings), seed, None).run(on_tick)
     return tuple(ticks)
 
 
 @cache
 def usual_tare(seed: int) -> SavedTare:
     """Return the tare of a run without a fault."""
-    found = Lockstep(_rig(SETTINGS), seed, NoLog()).run(lambda *_: None)
+    found = Lockstep(_rig(SETTINGS), seed, None).run(lambda *_: None)
     return SavedTare((*found["bias_force_N"], *found["bias_torque_Nm"]), tuple(found["held_joints_rad"]), "", 0.0)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from robot_io.clock import NS_PER_S
 from robot_io.tick import ControlTick
 from tools.faults.judgement import Proof
-from tools.faults.lockstep_round import SETTINGS, NoLog
+from tools.faults.lockstep_round import SETTINGS
 from tools.rig import resolve_rig, with_faults
 from tools.run.lockstep import Lockstep, LockstepLog
 
@@ -57,7 +57,7 @@ def prove_whole_run(row: str) -> Proof:
 
 def late_force() -> str:
     """Return what is wrong with a push whose force is 50 ms old although its times are fresh; "" for nothing."""
-    ended = _run(NoLog(), (f"ft.delayed={LAG_S} at 0 s",))
+    ended = _run(None, (f"ft.delayed={LAG_S} at 0 s",))
     goal = resolve_rig("sim", SETTINGS).goal
     if ended["exit_code"] or ended["fault_counts"]:
         return f"exit code {ended['exit_code']}, {', '.join(ended['fault_counts']) or 'no fault'}"
@@ -78,7 +78,7 @@ def an_hour() -> str:
     """Return what grows over an hour of pushes, one after the other, on the virtual clock; "" for nothing."""
     gone_s, early = 0.0, None
     while gone_s < HOUR_S:
-        ended = _run(NoLog())
+        ended = _run(None)
         gone_s += ended["loop"]["ticks"] / ended["loop"]["rate_hz"]
         if early is None and gone_s >= USUAL_SHARE * HOUR_S:
             early = _kept()
@@ -97,7 +97,7 @@ CHECKS: dict[str, tuple[str, Callable[[], str]]] = {
 }
 
 
-def _run(log: LockstepLog, words: tuple[str, ...] = ()) -> dict[str, Any]:
+def _run(log: LockstepLog | None, words: tuple[str, ...] = ()) -> dict[str, Any]:
     return Lockstep(with_faults(resolve_rig("sim", SETTINGS), words), 0, log).run(lambda *_: None)
 
 

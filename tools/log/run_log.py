@@ -26,6 +26,7 @@ from tools.log.thinned_topics import holds_world_state
 from tools.log.tick_topics import Message
 
 OFFSET_FACT = "wall_offset_ns"
+DERIVED_FACT, NOT_DERIVED = "derived_topics", "left out"
 STATE_EVERY_NS = 10 * NS_PER_S
 """At least so often a tick holds the state before it, from which replay can start."""
 
@@ -34,9 +35,9 @@ class RunLog:
     """One file of a run's log.
 
     config_text: the resolved rig. wall_offset_ns: added to each record's time to get its log time; stored in
-    `metadata`. also: called with topic, log time and payload of each message that was written. heard: what was learned
-    in the files before. newest: the last tick in them. Raises as `McapLog` and `rig_from_toml`; OSError when writing to
-    disk fails.
+    `metadata`. also: called with topic, log time and payload of each message that was written. derive: whether the
+    topics made of others are written, too; what is left out can be derived again. heard: what was learned in the files
+    before. newest: the last tick in them. Raises as `McapLog` and `rig_from_toml`; OSError when writing to disk fails.
     """
 
     def __init__(
@@ -47,10 +48,14 @@ class RunLog:
         metadata: dict[str, str],
         wall_offset_ns: int,
         also: Callable[[str, int, bytes], None] | None = None,
+        derive: bool = True,
         heard: Heard | None = None,
         newest: ControlTick | None = None,
     ) -> None:
         self._also = also
+        self._derives = derive
+        if not derive:
+            metadata = metadata | {DERIVED_FACT: NOT_DERIVED}
         rig = rig_from_toml(config_text)
         self._derive = Derivation(rig, wall_offset_ns)
         self._rig = rig
@@ -94,7 +99,7 @@ class RunLog:
                 self._heard.stamped(kind, payload, log_time_ns)
             elif kind == Kind.BASE_CLOCK:
                 self._note_clock(payload)
-            if kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
+            if self._derives and kind in (Kind.WORLD_STATE, Kind.SLIDER_POSE):
                 self._slider(kind, log_time_ns, payload)
         else:
             self.unknown_kinds += 1
@@ -109,8 +114,9 @@ class RunLog:
         if tick is None:
             self.undecodable += 1
             return
-        for derived in self._derive.tick(tick):
-            self._write(derived)
+        if self._derives:
+            for derived in self._derive.tick(tick):
+                self._write(derived)
 
     def flush(self) -> None:
         """Flush everything to the operating system."""
@@ -138,7 +144,7 @@ class RunLog:
         self._log.abandon()
 
     def _write(self, message: Message) -> None:
-        if not self._scene_written:
+        if self._derives and not self._scene_written:
             self._scene_written = True  # not earlier: the first record's time is the start of the log
             for first in self._derive.scene(message.log_time_ns):
                 self._write(first)

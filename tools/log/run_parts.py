@@ -35,9 +35,10 @@ class RunParts:
         metadata: dict[str, str],
         wall_offset_ns: int,
         also: Callable[[str, int, bytes], None] | None = None,
+        derive: bool = True,
     ) -> None:
         self._log = log
-        self._config_text, self._metadata, self._also = config_text, metadata, also
+        self._config_text, self._metadata, self._also, self._derive = config_text, metadata, also, derive
         self._wall_offset_ns = wall_offset_ns
         self._settings = rig_from_toml(config_text).log
         self._heard = Heard()
@@ -130,6 +131,7 @@ class RunParts:
             metadata=self._metadata | facts,
             wall_offset_ns=self._wall_offset_ns,
             also=self._also,
+            derive=self._derive,
             heard=self._heard,
             newest=before.newest if before is not None else None,
         )

@@ -10,7 +10,7 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -76,8 +76,13 @@ class Store:
 
     def load(self, items: int) -> list[Part]:
         """Return all parts in order; every item must be finished."""
-        parts = [self._read(index) for index in range(items)]
-        return [part for part in parts if part is not None]
+        return list(self.each(items))
+
+    def each(self, items: int) -> Iterator[Part]:
+        """Yield all parts in order, one at a time; every item must be finished."""
+        for index in range(items):
+            if (part := self._read(index)) is not None:
+                yield part
 
     def write_csv(self, name: str, columns: Sequence[str], rows: Sequence[Row]) -> None:
         """Write rows as CSV; floats as the shortest text that reads back to the same bits."""

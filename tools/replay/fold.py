@@ -16,6 +16,7 @@ from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.mcap.files import files_of
 from robot_io.rig.config import RigConfig
 from tools.log.derivation import WORLD_TOPIC
+from tools.log.run_log import DERIVED_FACT, NOT_DERIVED
 from tools.log.run_parts import SINCE_FACT
 from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplayer
 from tools.replay.derived import DerivedReplay, DerivedReplayer
@@ -79,6 +80,7 @@ class _Session:
             else None
         )
         self._derived: list[DerivedReplay] = []
+        self._derives = log.facts.get(DERIVED_FACT) != NOT_DERIVED
 
     def take(self, log: VerifiedLog) -> None:
         """Re-run and compare one file. Raises LogDamaged."""
@@ -92,18 +94,21 @@ class _Session:
         for topic, log_time_ns, payload, tick in log.messages():
             if tick is not None:
                 ticks.take(tick, payload)
-                derived.tick(tick, log_time_ns)
+                if self._derives:
+                    derived.tick(tick, log_time_ns)
                 if arrived is not None:
                     arrived.tick(tick)
                 continue
             if topic.startswith(PREFIX) and world is not None:
                 world.take(topic, payload)
-            if topic == WORLD_TOPIC:
+            if topic == WORLD_TOPIC and self._derives:
                 derived.world(state.decode(payload), log_time_ns)
-            derived.seen(topic, log_time_ns, payload)
+            if self._derives:
+                derived.seen(topic, log_time_ns, payload)
             if arrived is not None:
                 arrived.seen(topic, log_time_ns, payload)
-        self._derived.append(derived.result(complete=log.complete))
+        if self._derives:
+            self._derived.append(derived.result(complete=log.complete))
 
     def result(self, logs: Sequence[VerifiedLog]) -> ReplayResult:
         """Return how all files compared."""

@@ -28,7 +28,7 @@ class ReplayResult(msgspec.Struct, frozen=True):
     first_difference: Difference | None
     world: WorldReplay | None
     derived: DerivedReplay | None
-    """None if only the ticks were compared."""
+    """None if only the ticks were compared, or the log holds none."""
     arrived: BaseInputsReplay | None
     """None if it cannot be compared: the log is of an earlier format, or records did not fit into the gate's ring."""
     complete: bool
@@ -64,7 +64,7 @@ def notes_of(
     engine_missing: bool,
     ticks_only: bool,
 ) -> tuple[str, ...]:
-    """Return in words what could not be compared. 
+    """Return in words what could not be compared.
 
     has_world: whether the log holds all records of its world. engine_missing: what moved it is not installed here.
     """
@@ -85,7 +85,9 @@ def notes_of(
     elif world is not None:
         notes += types.state.notes(WORLD_TOPIC)
     notes += _engine_notes(logs[0].facts, rig)
-    if derived is not None and derived.not_compared:
+    if derived is None:
+        notes.append("topics that are derived from others were left out of this log")
+    elif derived.not_compared:
         words = ", ".join(derived.not_compared)
         notes.append(f"not compared, because they are derived differently today: {words}")
     return tuple(notes)

@@ -50,7 +50,7 @@ MAX_SIMULATED_S = 4 * 3600.0
 
 
 class LockstepLog(Protocol):
-    """Receives the records of a lockstep run: a `RunParts`, or a sweep's log that keeps nothing."""
+    """Receives the records of a lockstep run, a `RunParts` say."""
 
     def record(self, kind: int, time_ns: int, payload: bytes) -> None:
         """Receive one ring record."""
@@ -64,43 +64,45 @@ class LockstepLog(Protocol):
 class Lockstep:
     """One push in lockstep. `log` receives each record as the rings would; `run` returns the final figures.
 
-    law: the rig's law where it is not a shipped one. Raises ConfigError without it.
+    log: None keeps nothing, so that no record is made at all; nothing else changes. law: the rig's law where it is
+    not a shipped one; raises ConfigError without it. timed: whether a step of such a law that takes too long is a
+    fault: what else this machine does may then change a run.
     """
 
     def __init__(
         self,
         rig: RigConfig,
         seed: int,
-        log: LockstepLog,
+        log: LockstepLog | None,
         *,
         saved: SavedTare | None = None,
         law: Law | None = None,
+        timed: bool = True,
     ) -> None:
         self.rig = rig
         self._log = log
-        push = log.record
         self._clock = VirtualClock(START_NS)
         self._period_ns = round(NS_PER_S / rig.loop.rate_hz)
-        self.world = World(rig, seed, START_NS, ring_listener(push))
+        self.world = World(rig, seed, START_NS, None if log is None else ring_listener(log.record))
         world = rig.world
         self._ft = simulated_sensor(rig, self.world, self._clock)
         self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_cycle_hz, phase=world.arm_phase)
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig, seed), pose_source=rig.base.pose_source
         )
-        self._note_injected = event_writer(push, SIM_WALL_OFFSET_NS)
+        self._note_injected = None if log is None else event_writer(log.record, SIM_WALL_OFFSET_NS)
         self.first_injected_ns: int | None = None
         self.injection = Injection(rig.faults.inject, self._clock, self._on_injected)
         self.injection.begin(START_NS)
         self._ft_edge = InjectedSensor(self._ft, self.injection, rig)
         self._arm_edge = InjectedArm(self._arm, self.injection)
         self._base_edge = InjectedBase(self._base, self.injection)
-        self._law = None if law is None else LawClock(law, round(rig.limits.law_ms * 1e6))
-        self._core = TickCore.of(rig, in_contact=saved is not None, law=self._law)
+        self._law = LawClock(law, round(rig.limits.law_ms * 1e6)) if law is not None and timed else None
+        self._core = TickCore.of(rig, in_contact=saved is not None, law=self._law or law)
         self._state = initial_state(saved)
         self._recorded = False
         self._gate = GateShell(self._core.safety.envelope, total_bounds(rig), START_NS)
-        self._gate_log = GateLog(push, SIM_WALL_OFFSET_NS)
+        self._gate_log = None if log is None else GateLog(log.record, SIM_WALL_OFFSET_NS)
         self.notes = RunNotes()
         self.operator = Operator.NONE
         self.paused = False
@@ -111,7 +113,8 @@ class Lockstep:
         for device in devices:
             info = device.open()
             device.start()
-        self._gate_log.clock(START_NS, info.clock)  # the base is the last
+        if self._gate_log is not None:
+            self._gate_log.clock(START_NS, info.clock)  # the base is the last
         tick = 0
         while True:
             now_ns = START_NS + tick * self._period_ns
@@ -162,9 +165,10 @@ class Lockstep:
 
     def _finish_tick(self, inp: TickInput, after: TickState, output: TickOutput) -> None:
         self._send(inp.tick, inp.now_ns, output)
-        message = ControlTick(0, 0, inp, () if self._recorded else (self._state,), after, output)
-        self._recorded = True
-        self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
+        if self._log is not None:
+            message = ControlTick(0, 0, inp, () if self._recorded else (self._state,), after, output)
+            self._recorded = True
+            self._log.tick(inp.now_ns, TICK_CDR.encode(message), message)
         self._state = after
         self.notes.note(inp, after, output)
 
@@ -178,7 +182,7 @@ class Lockstep:
         """Let the gate judge and send what is due."""
         self._gate = self._gate.on_clock(now_ns, self._base_edge.health())
         self._gate, latching = self._gate.on_leaving(now_ns)
-        if latching is not None:
+        if latching is not None and self._gate_log is not None:
             self._gate_log.latched(now_ns, *astuple(latching))
         wanted = self._gate.due(now_ns)
         if wanted is not None:
@@ -188,17 +192,20 @@ class Lockstep:
                 self._gate = self._gate.on_sent(wanted, None, now_ns)
                 return
             self._gate = self._gate.on_sent(wanted, really, now_ns)
-            self._gate_log.sent(now_ns, really)
+            if self._gate_log is not None:
+                self._gate_log.sent(now_ns, really)
 
     def _on_injected(self, word: FaultWord, now_ns: int) -> None:
         if self.first_injected_ns is None:
             self.first_injected_ns = now_ns
-        self._note_injected(word, now_ns)
+        if self._note_injected is not None:
+            self._note_injected(word, now_ns)
 
     def _take_base(self, now_ns: int) -> None:
         samples = self._base_edge.drain()
-        for sample in samples:
-            self._gate_log.inbound(sample)
+        if self._gate_log is not None:
+            for sample in samples:
+                self._gate_log.inbound(sample)
         # No pings here: there is no bridge that could answer.
         self._gate = self._gate.on_samples(samples).on_publish(
             now_ns, newest_inbound_ns=self._base_edge.newest_inbound_ns, newest_pong_ns=0
@@ -213,11 +220,17 @@ def open_log(
     in_contact: bool,
     note: str = "",
     to_view: socket.socket | None = None,
+    derive: bool = True,
 ) -> RunParts:
-    """Open the log of a lockstep run; its facts hold nothing that differs from run to run. to_view: a live view's."""
+    """Open the log of a lockstep run; its facts hold nothing that differs from run to run.
+
+    to_view: a live view's. derive: whether the topics made of others are written, too.
+    """
     facts = run_facts(rig_from_toml(config_text), seed, in_contact=in_contact, note=note)
     also = LiveFeed(to_view).add if to_view is not None else None
-    return RunParts(path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_WALL_OFFSET_NS, also=also)
+    return RunParts(
+        path, config_text=config_text, metadata=facts, wall_offset_ns=SIM_WALL_OFFSET_NS, also=also, derive=derive
+    )
 
 
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sim_backend.physics.lanes import State, Timing
-from tools.parallel.part import Row
 from tools.sweep.grid import Case
 
 if TYPE_CHECKING:
@@ -57,28 +56,6 @@ def trajectories(cases: Sequence[Case], states: Floats, ends: Floats, title: str
         axes.set_ylabel("y (m)")
     panels[-1].set_xlabel("x (m)")
     figure.suptitle(title, fontsize=10)
-    return figure
-
-
-def experiment(rows: Sequence[Row], states: Floats) -> Figure:
-    """Draw the simulated experiment, one panel per slider: force feedback in colour, open loop in black.
-
-    `states`: (runs, kept, 3), the slider's pose.
-    """
-    sliders = list(dict.fromkeys(str(row["slider"]) for row in rows))
-    figure = _figure(7.0, 0.6 + 2.2 * len(sliders))
-    panels = figure.subplots(len(sliders), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, slider in zip(panels, sliders, strict=True):
-        for i, row in enumerate(rows):
-            if row["slider"] == slider:
-                style = {"color": "black", "linewidth": 1.2} if row["controller"] == "open-loop" else {"linewidth": 1.0}
-                axes.plot(states[i, :, 0], states[i, :, 1], **style)
-        for y in (-0.5, 0.5):
-            axes.axhline(y, color="grey", linewidth=0.8, linestyle=":")
-        axes.axhline(0.0, color="grey", linewidth=0.8, linestyle="--")
-        axes.set_title(f"{slider}: force feedback in colour, open loop in black", fontsize=9)
-        axes.set_ylabel("y (m)")
-    panels[-1].set_xlabel("x (m)")
     return figure
 
 

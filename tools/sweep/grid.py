@@ -144,7 +144,7 @@ def check_law(law: object, where: str) -> None:
         raise UsageError(
             f"`push sweep` knows the shipped laws ({', '.join(get_args(LaneLaw))}), not `{law}`",
             where=where,
-            do="Use push study, which runs any law",
+            do="Use `push study`, which runs any law",
         )
 
 

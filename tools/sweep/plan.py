@@ -11,17 +11,6 @@ import msgspec
 
 from tools.parallel.part import Part
 from tools.sweep.grid import Study
-from tools.sweep.hardware import (
-    COLUMNS as HARDWARE_COLUMNS,
-)
-from tools.sweep.hardware import (
-    check_flags,
-    hardware_items,
-    rig_of,
-    run_hardware_item,
-    sources,
-)
-from tools.sweep.hardware_summary import hardware_sentences, summarise_hardware
 from tools.sweep.items import COLUMNS, cut, run_lane_item
 from tools.sweep.paper import sample_cases
 
@@ -64,25 +53,12 @@ def lanes_plan(study: Study) -> Plan:
     return Plan(study.name, msgspec.to_builtins(study), LANE_SOURCES, cut(study), run_lane_item, compile_kernel, write)
 
 
-def hardware_plan(gains: tuple[float, float] | None, dt_s: float | None, open_loop: bool) -> Plan:
-    """Return the plan of the simulated experiment. Raises UsageError for wrong flags, ConfigError for wrong gains."""
-    check_flags(dt_s, open_loop)
-    items = hardware_items(gains)
-    rig_of(items[0])  # report invalid gains before anything runs
-    definition = msgspec.to_builtins(items)
-    return Plan("hardware", definition, sources(ROOT), items, run_hardware_item, _nothing, _write_hardware)
-
-
 def compile_kernel() -> None:
     """Compile the lane kernel once in this process, so that workers find it in numba's cache."""
     from sim_backend.physics.batch import run_batch
     from sim_backend.physics.lanes import Lane, Timing
 
     run_batch([Lane(True, 0.5, 0.5, 0.3, 0.5, 0.0, 0.0, 0.0)], Timing(steps=1, record_every=1))
-
-
-def _nothing() -> None:
-    """Do nothing: this study needs no preparation."""
 
 
 def _write_lanes(study: Study, store: Store, parts: list[Part]) -> tuple[dict[str, Any], list[str]]:
@@ -106,22 +82,3 @@ def _write_lanes(study: Study, store: Store, parts: list[Part]) -> tuple[dict[st
         shown = [study.cases[i] for i in chosen]
         files += sweep_figures.save(sweep_figures.samples(shown, study.timing), store.out, "samples")
     return summary | {"files": ["results.csv", "states.npz", "summary.json", *files]}, sentences(summary)
-
-
-def _write_hardware(store: Store, parts: list[Part]) -> tuple[dict[str, Any], list[str]]:
-    """Write results.csv, states.npz (slider poses, NaN after a run's end), summary.json and the figure."""
-    import numpy as np
-
-    from tools.sweep import figures as sweep_figures
-
-    rows = [row for part in parts for row in part.rows]
-    longest = max(len(part.arrays["slider"]) for part in parts)
-    states = np.full((len(parts), longest, 3), np.nan)
-    for i, part in enumerate(parts):
-        states[i, : len(part.arrays["slider"])] = part.arrays["slider"]
-    store.write_csv("results.csv", HARDWARE_COLUMNS, rows)
-    store.write_arrays("states.npz", {"states": states})
-    summary = summarise_hardware(rows, states)
-    store.write_json("summary.json", summary)
-    files = sweep_figures.save(sweep_figures.experiment(rows, states), store.out, "trajectories")
-    return summary | {"files": ["results.csv", "states.npz", "summary.json", *files]}, hardware_sentences(summary)

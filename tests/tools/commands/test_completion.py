@@ -47,7 +47,9 @@ def completed(script: Path, line: str, cwd: Path) -> list[str]:
     [
         ("push repl", ["replay"]),
         ("push re", ["replay", "report"]),
-        ("push bench ", ["sim", "physics"]),
+        ("push study sh", ["show"]),
+        ("push study show --wh", ["--where"]),
+        ("push bench ", ["sim", "physics", "loop"]),
         ("push log exp", ["export"]),
         ("push run sim --dist", ["--distance-m"]),
         ("push replay --w", ["--what-if"]),

@@ -121,16 +121,6 @@ class Drifting:
         return tuple(wrench)
 
 
-class NoLog:
-    """Keeps nothing."""
-
-    def record(self, kind, time_ns, payload):
-        """Forget a record."""
-
-    def tick(self, time_ns, payload, tick):
-        """Forget a tick."""
-
-
 def test_a_sensor_that_drifts_into_contact_is_never_done(monkeypatch):
     """Nothing was touched: the object stands 1.2 m away, and the drift alone counts as contact for 0.2 m."""
     made = simulated_sensor
@@ -149,7 +139,7 @@ def test_a_sensor_that_drifts_into_contact_is_never_done(monkeypatch):
         path=replace(rig.path, expected_contact_m=1.2),
         control=replace(rig.control, distance_m=0.2),
     )
-    figures = Lockstep(rig, 0, NoLog()).run(lambda *_: None)
+    figures = Lockstep(rig, 0, None).run(lambda *_: None)
     trust = gather(rig, figures, Witness())
     verdict = judge(figures["exit_code"], trust)
     assert verdict.exit_code in (4, 5, 6, 9), "refused, stopped or not trusted, and never done"

@@ -115,21 +115,11 @@ def test_the_same_bounds_are_in_log_summary_and_dry_run(tmp_path):
 # --- whole runs ---------------------------------------------------------------------------------------------------
 
 
-class NoLog:
-    """Keeps nothing."""
-
-    def record(self, *_):
-        pass
-
-    def tick(self, *_):
-        pass
-
-
 def run(*overrides, seed=0):
     """Return the figures of a run at level sim, and its ticks."""
     rig = resolve_rig("sim", overrides)
     ticks = []
-    figures = Lockstep(rig, seed, NoLog()).run(lambda inp, state, output: ticks.append((inp, state, output)))
+    figures = Lockstep(rig, seed, None).run(lambda inp, state, output: ticks.append((inp, state, output)))
     return figures, ticks
 
 

@@ -1,0 +1,1 @@
+"""`push study`: many whole pushes of the program, each with its own settings; tables, figures and who made them."""
