@@ -20,4 +20,5 @@ def ft_input(
         counters.get("packets_ok", taken),
         counters.get("crc_fail", 0),
         counters.get("junk_bytes", 0),
+        counters.get("bias_jumps", 0),
     )

@@ -17,7 +17,10 @@ from robot_io.errors import ConfigError, DeviceError, PushError
 from robot_io.messages import DeviceInfo
 
 SHIPPED: dict[str, dict[str, str]] = {
-    "ft": {"robotiq-ft300": "robot_io.ft300.driver:Ft300"},
+    "ft": {
+        "robotiq-ft300": "robot_io.ft300.driver:Ft300",
+        "ur-tool-force": "robot_io.ur10.tool_force:UrToolForce",
+    },
     "arm": {"ur": "robot_io.ur10.driver:Ur10"},
     "base": {"ridgeback-rosbridge": "robot_io.ridgeback.driver:Ridgeback"},
 }

@@ -99,6 +99,7 @@ FAULTS: dict[str, Fault] = dict(
         ),
         _row("F12-low", "the force sensor sends too few packets", _WARN, _A, 0),
         _row("F12-hold", "the force sensor sends far too few packets", Mode.HOLD, _A, 100),
+        _row("F15", "the force sensor's bias jumped: it was zeroed, or its payload was changed", Mode.STOP, _L, 1),
         _row("F20-hold", "the arm drifts from its held joints", Mode.HOLD, _L, 1),
         _row("F20-stop", "the arm has left its held joints: tare again", Mode.STOP, _L, 1),
         _row("F21", "an arm joint is moving", Mode.STOP, _L, 3),

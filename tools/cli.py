@@ -138,6 +138,7 @@ ACTIONS = {
     "calibrate marker": ("push calibrate marker --rehearse", "push calibrate marker my-rig.toml --out marker.toml"),
     "calibrate path": ("push calibrate path my-rig.toml --two-places", "push calibrate path --rehearse --json"),
     "emulate ft300": ("push emulate ft300 --wrench=-10,0,0,0,0,0", "push emulate ft300 --streaming --latency-ms 16"),
+    "emulate ur": ("push emulate ur --model ur10e", "push emulate ur --model ur5e --wrench=0,0,-15,0,0,0 --json"),
     "emulate ur10": ("push emulate ur10", "push emulate ur10 --host 127.0.0.11 --json"),
     "emulate ridgeback": ("push emulate ridgeback", "push emulate ridgeback --port 0 --json"),
     "emulate all": ("push emulate all", "push emulate all barrel --seed 3 --json"),

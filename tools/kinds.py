@@ -39,7 +39,12 @@ class KindQuery(msgspec.Struct, frozen=True):
     status_fd: int = -1
 
 
-SHORT_NAMES = {"robotiq-ft300": "ft300", "ur": "ur10", "ridgeback-rosbridge": "ridgeback"}
+SHORT_NAMES = {
+    "robotiq-ft300": "ft300",
+    "ur-tool-force": "tool-force",
+    "ur": "ur10",
+    "ridgeback-rosbridge": "ridgeback",
+}
 
 
 def name_of(kind: str) -> str:

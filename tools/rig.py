@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from robot_io.errors import ConfigError
 from robot_io.rig.config import RigConfig, load_rig
-from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.declared import FT300_FACTS, TOOL_FORCE, TOOL_FORCE_FACTS
 from robot_io.rig.fault_words import parse_fault
 from robot_io.rig.files import shipped_rigs
 from robot_io.rig.types import Matrix3
@@ -30,7 +30,8 @@ def resolve_rig(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RigC
 
     folder = folder_of(name_or_path)
     rig, problems = _with_kinds(with_law(load_rig(name_or_path, overrides), folder), folder)
-    problems += _name_problems(rig) + _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
+    rig, more = _with_tool_force(rig)
+    problems += more + _name_problems(rig) + _level_problems(rig) + _address_problems(rig) + rig.workspace.problems()
     check_faults(rig)
     if not is_rotation(rig.frames.base_from_sensor):
         problems.append("`frames.base_from_sensor` is not a rotation (orthonormal rows, determinant +1)")
@@ -71,6 +72,25 @@ def _with_kinds(rig: RigConfig, folder: str) -> tuple[RigConfig, list[str]]:
         if device in declared_by and device != "ft"
     ]
     return rig, problems
+
+
+def _with_tool_force(rig: RigConfig) -> tuple[RigConfig, list[str]]:
+    """Return the rig with facts and address of its arm's own sensor filled in, and what is wrong with them."""
+    if rig.ft.kind != TOOL_FORCE:
+        return rig, []
+    model = str(rig.ft.options.get("model", ""))
+    problems = []
+    if model not in TOOL_FORCE_FACTS:
+        cb3 = f"{model} is none: a CB3 arm only estimates forces" if model in ("UR3", "UR5", "UR10") else "is missing"
+        problems.append(f"`ft.options.model` {cb3}; {TOOL_FORCE} is the sensor of a {', '.join(TOOL_FORCE_FACTS)}")
+    if rig.arm.kind != "ur":
+        problems.append(f"`arm.kind` = {rig.arm.kind!r}, and {TOOL_FORCE} is the sensor of a `ur`")
+    if rig.ft.level != rig.arm.level:
+        problems.append(f"{TOOL_FORCE} is the arm's own sensor, so `ft.level` must be the arm's, {rig.arm.level!r}")
+    if rig.ft.port not in ("", rig.arm.host):
+        problems.append(f"`ft.port` is not needed: {TOOL_FORCE} is at `arm.host`")
+    facts = TOOL_FORCE_FACTS.get(model, rig.ft.declared)
+    return replace(rig, ft=replace(rig.ft, declared=facts, port=rig.arm.host)), problems
 
 
 def devices_at(rig: RigConfig, level: str) -> list[str]:

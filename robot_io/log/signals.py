@@ -26,7 +26,7 @@ class Contact(IntEnum):
 FAULT_IDS: tuple[str, ...] = (
     *("R01", "R02", "R02-dead", "R02-contact", "R03", "R04", "R05", "R06", "R07"),
     *("F01-slow", "F01-hold", "F01-stop", "F02", "F04", "F06", "F07", "F08", "F09", "F09-before"),
-    *("F10", "F11", "F12-low", "F12-hold", "F20-hold", "F20-stop", "F21", "F22", "F23", "F24-hold", "F24-stop"),
+    *("F10", "F11", "F12-low", "F12-hold", "F15", "F20-hold", "F20-stop", "F21", "F22", "F23", "F24-hold", "F24-stop"),
     *("F25-hold", "F25-stop", "F27", "F28", "F29", "F30", "F31-hold", "F31-stop", "F32-slow", "F32-stop"),
     *("F33", "F33-way", "F34", "F35", "F36", "F37", "F38", "F38-late", "F39", "F40-slow", "F40-stop", "F41", "F42"),
     *("F43", "F44", "F45-approach", "F45-push", "F45-retreat", "F46-approach", "F46-push", "F46-retreat"),

@@ -33,8 +33,8 @@ from robot_io.rig.topics import TopicsConfig
 
 PoseSource = Literal["mocap", "odometry", "joint_states"]
 
-FRESH_NS = 100 * NS_PER_MS
-"""Nothing that moves is sent when the newest message from the bridge is older than this."""
+FRESH_NS = 70 * NS_PER_MS
+"""Nothing that moves is sent when the newest message from the bridge is older than this: 7 commands at 100 Hz."""
 LINK_STALE_NS = 300 * NS_PER_MS
 """The link is given up when nothing has come from the bridge for this long, or no command of ours was heard back."""
 BACKLOG_NS = 200 * NS_PER_MS
@@ -103,11 +103,11 @@ class Ridgeback(DriverBase):
         return cls(address, **shared)
 
     def open(self) -> DeviceInfo:
-        """Connect, check topics, advertise, subscribe; at most 6 s. Nothing is commanded.
+        """Connect, check topics (for 3 s, where `rosapi` is still starting), advertise, subscribe; at most 9 s.
 
-        Raises DeviceUnreachable (unknown name, nothing listens, no handshake, the link broke), DeviceProtocolError (no
-        bridge, a certificate that is not trusted, wrong message type) or DeviceNotReady (nobody listens to the
-        command topic).
+        Nothing is commanded. Raises DeviceUnreachable (unknown name, nothing listens, no handshake, the link broke),
+        DeviceProtocolError (no bridge, a certificate that is not trusted, wrong message type) or DeviceNotReady (nobody
+        listens to the command topic).
         """
         self.close()
         self._reset()
@@ -176,7 +176,7 @@ class Ridgeback(DriverBase):
     def command(self, wanted: BodyTwist) -> BodyTwist:
         """Send a velocity (m/s, m/s, rad/s, BODY frame); return what was really sent.
 
-        Zero is sent instead when the link has been quiet for 0.1 s or is given up, and zero is returned when nothing
+        Zero is sent instead when the link has been quiet for 0.07 s or is given up, and zero is returned when nothing
         could be sent (`health` says why): the base then stops by its own timeout. That is 0.25 s after the last
         command, so a motion lasts only as long as commands do. Never blocks. Raises ValueError unless finite.
         """

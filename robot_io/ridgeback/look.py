@@ -13,6 +13,7 @@ from robot_io.errors import DeviceUnreachable
 from robot_io.messages import BaseFeed, CommandEcho, Pose2D, Stamped
 from robot_io.ridgeback.feeds import FeedReader, feed_types, with_full_names
 from robot_io.ridgeback.intake import Intake
+from robot_io.ridgeback.preflight import ASK_AGAIN_S, ROSAPI_TIMEOUT_S
 from robot_io.ridgeback.rosbridge_codec import (
     ServiceAnswer,
     decode_frame,
@@ -82,6 +83,7 @@ class RidgebackLook:
         self._reader = FeedReader(topics, pose_source, Pose2D(*base_from_marker))
         self._link = WebSocketLink.connect(url, clock)
         self._calls = 0
+        self._cold_until_ns = clock() + int(ROSAPI_TIMEOUT_S * NS_PER_S)
 
     def __enter__(self) -> Self:
         return self
@@ -174,7 +176,19 @@ class RidgebackLook:
             raise self._gone(lost) from lost
 
     def _ask(self, service: str, arguments: dict[str, str]) -> bytes | None:
-        """Return the values of an answer; None where none comes within 1 s, or the call fails."""
+        """Return the values of an answer; None where none comes within 1 s, or the call fails.
+
+        A call that fails is made again while the bridge may only be starting.
+        """
+        while True:
+            answer = self._ask_once(service, arguments)
+            if answer is None or answer.ok:
+                return answer.values if answer is not None else None
+            if self._clock() > self._cold_until_ns:
+                return None
+            time.sleep(ASK_AGAIN_S)
+
+    def _ask_once(self, service: str, arguments: dict[str, str]) -> ServiceAnswer | None:
         self._calls += 1
         call_id = f"look:{self._calls}"
         try:
@@ -184,7 +198,7 @@ class RidgebackLook:
                 for text, _ in self._link.receive():
                     answer = _decoded(decode_frame, text)
                     if isinstance(answer, ServiceAnswer) and answer.call_id == call_id:
-                        return answer.values if answer.ok else None
+                        return answer
         except LinkLost as lost:
             raise self._gone(lost) from lost
         return None

@@ -6,7 +6,7 @@ that does not move. The answers come from the `rosapi` node; without it the chec
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import msgspec
 
@@ -25,7 +25,10 @@ from robot_io.ridgeback.rosbridge_codec import (
 )
 from robot_io.ridgeback.websocket_link import WebSocketLink
 
-ROSAPI_TIMEOUT_S = 1.0
+ROSAPI_TIMEOUT_S = 3.0
+"""`rosapi` starts some seconds after the bridge, and answers slowly at first."""
+ASK_AGAIN_S = 0.3
+"""A question that failed, because `rosapi` is not there yet, is asked again after this."""
 
 _WHO_LISTENS = "subscribers"
 _WHO_COMMANDS = "publishers"
@@ -56,44 +59,60 @@ class Answers(msgspec.Struct, frozen=True):
 def check_topics(
     link: WebSocketLink, where: str, command_topic: str, types: Mapping[str, str], clock: ClockNs
 ) -> Answers:
-    """Check the type of every topic of `types` and that somebody listens to `command_topic`; takes at most 1 s.
+    """Check the type of every topic of `types` and that somebody listens to `command_topic`; takes at most 3 s.
 
     Raises DeviceProtocolError (a topic carries another type),
     DeviceNotReady (nobody listens to the commands) and `LinkLost`.
     """
-    link.send_text(encode_call(_WHO_LISTENS, "/rosapi/subscribers", {"topic": command_topic}))
-    link.send_text(encode_call(_WHO_COMMANDS, "/rosapi/publishers", {"topic": command_topic}))
-    for topic in types:
-        link.send_text(encode_call(f"type:{topic}", "/rosapi/topic_type", {"topic": topic}))
-    waiting = {_WHO_LISTENS, _WHO_COMMANDS, *(f"type:{topic}" for topic in types)}
-    unanswered: list[str] = []
-    until_ns = clock() + int(ROSAPI_TIMEOUT_S * NS_PER_S)
-    asked = len(waiting)
+    questions = {
+        _WHO_LISTENS: encode_call(_WHO_LISTENS, "/rosapi/subscribers", {"topic": command_topic}),
+        _WHO_COMMANDS: encode_call(_WHO_COMMANDS, "/rosapi/publishers", {"topic": command_topic}),
+        **{f"type:{topic}": encode_call(f"type:{topic}", "/rosapi/topic_type", {"topic": topic}) for topic in types},
+    }
     listeners: list[str] | None = None
     others: list[str] = []
-    while waiting and link.wait_readable(until_ns):
-        for text, _ in link.receive():
-            answer = _answer(text)
-            if answer is None or answer.call_id not in waiting:
-                continue
-            waiting.discard(answer.call_id)
-            try:
-                if answer.call_id == _WHO_LISTENS:
-                    listeners = decode_subscribers(answer.values)
-                elif answer.call_id == _WHO_COMMANDS:
-                    others = _other_nodes(decode_publishers(answer.values))
-                else:
-                    topic = answer.call_id.removeprefix("type:")
-                    _check_type(where, topic, types[topic], decode_topic_type(answer.values))
-            except ValueError:  # no rosapi: the call failed, and its values are a sentence
-                unanswered.append(answer.call_id)
+    unanswered = set(questions)
+    for answer in _answers(link, questions, clock):
+        try:
+            if answer.call_id == _WHO_LISTENS:
+                listeners = decode_subscribers(answer.values)
+            elif answer.call_id == _WHO_COMMANDS:
+                others = _other_nodes(decode_publishers(answer.values))
+            else:
+                topic = answer.call_id.removeprefix("type:")
+                _check_type(where, topic, types[topic], decode_topic_type(answer.values))
+        except ValueError:  # not what rosapi says
+            continue
+        unanswered.discard(answer.call_id)
     if listeners is not None and not _other_nodes(listeners):
         raise DeviceNotReady(
             f"nothing subscribes to the command topic {command_topic}",
             where=where,
             do="Start the base's software (twist_mux and the wheel controller), or correct base.topics.command",
         )
-    return Answers((*unanswered, *sorted(waiting)), asked, tuple(others))
+    return Answers(tuple(sorted(unanswered)), len(questions), tuple(others))
+
+
+def _answers(link: WebSocketLink, questions: Mapping[str, bytes], clock: ClockNs) -> Iterator[ServiceAnswer]:
+    """Ask everything and give the answers as they come; what fails is asked again, and given up when time is over."""
+    until_ns = clock() + int(ROSAPI_TIMEOUT_S * NS_PER_S)
+    waiting, failed = set(questions), set(questions)
+    while waiting and clock() < until_ns:
+        for call_id in questions:
+            if call_id in failed:
+                link.send_text(questions[call_id])
+        failed.clear()
+        again_ns = clock() + int(ASK_AGAIN_S * NS_PER_S)
+        while waiting and link.wait_readable(min(again_ns if failed else until_ns, until_ns)):
+            for text, _ in link.receive():
+                answer = _answer(text)
+                if answer is None or answer.call_id not in waiting:
+                    continue
+                if not answer.ok:  # no rosapi, or not yet
+                    failed.add(answer.call_id)
+                    continue
+                waiting.discard(answer.call_id)
+                yield answer
 
 
 def _other_nodes(nodes: list[str]) -> list[str]:

@@ -47,7 +47,8 @@ class LoopConfig(Table, frozen=True):
 class FtConfig(Table, frozen=True):
     """The force-torque sensor. `port` is what its kind takes; empty at levels sim and emulated.
 
-    For `robotiq-ft300`: a device path, a pty or `socket://host:port`.
+    For `robotiq-ft300`: a device path, a pty or `socket://host:port`. `ur-tool-force` is the sensor of the rig's own
+    e-Series arm, at its host; `[ft.options]` needs the `model`, whose range it is.
     """
 
     kind: str = "robotiq-ft300"

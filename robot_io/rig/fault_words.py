@@ -61,6 +61,7 @@ KINDS: dict[str, dict[str, FaultKind]] = {
         "dead-axis": FaultKind("axis =N (0 to 5) repeats its first value", (2.0,), above=-1.0),
         "crc": FaultKind("one packet in =N is damaged", (2.0,), above=0.0),
         "junk": FaultKind("one packet in =N is torn by a stray byte, and its bytes are junk", (2.0,), above=0.0),
+        "zeroed": FaultKind("somebody zeroes the sensor: its bias jumps to what it then reads"),
         "lost": FaultKind("the link is gone"),
     },
     "arm": _any_stream(6, "the joints (rad)")

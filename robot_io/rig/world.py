@@ -71,9 +71,9 @@ class StartConfig(Table, frozen=True):
 
 
 class SensorModelConfig(Table, frozen=True):
-    """How the simulated FT 300 errs: bias (N, N*m, sensor frame), tool weight and its centre, noise (1 sigma).
+    """How the simulated sensor errs: bias (N, N*m, sensor frame), tool weight and its centre, noise (1 sigma).
 
-    The weight is felt as the arm holds the sensor, by the published kinematics of a UR10.
+    The weight is felt as the arm holds the sensor, by the published kinematics of the UR arms.
     """
 
     bias: Vector6 = (-20.68, 21.95, -48.70, -0.097, 1.172, -0.321)
@@ -127,8 +127,10 @@ class WorldConfig(Table, frozen=True):
     sensor: SensorModelConfig = SensorModelConfig()
     truth: TruthConfig = TruthConfig()
     hand: tuple[HandConfig, ...] = ()
-    arm_rate_hz: Annotated[float, Meta(ge=20, le=125.5)] = 124.99
-    """Cycle of the emulated controller as a clock outside sees it."""
+    arm_model: Literal["UR3", "UR5", "UR10", "UR3e", "UR5e", "UR10e", "UR16e"] = "UR10"
+    """Which arm the emulated one is. One with an e is an e-Series arm, with PolyScope 5 and 500 cycles a second."""
+    arm_rate_hz: Annotated[float, Meta(ge=20, le=502)] | None = None
+    """Cycle of the emulated controller as a clock outside sees it; by default 124.99 (CB3) or 499.96 (e-Series)."""
     arm_phase: Annotated[float, Meta(ge=0, lt=1)] = 0.21
     """Where in a period a device samples, so that no run tests one frozen phase; likewise the others."""
     base_tick_rate_error: Annotated[float, Meta(ge=-0.01, le=0.01)] = 0.0001
@@ -146,3 +148,8 @@ class WorldConfig(Table, frozen=True):
     motion (Merriaux et al., Sensors 17, 1591, 2017)."""
     mocap_noise_deg: Annotated[float, Meta(ge=0, le=2)] = 0.2
     """The same of the heading: 0.5 mm at markers 0.15 m from their middle."""
+
+    @property
+    def arm_cycle_hz(self) -> float:
+        """Control cycles of the emulated arm in a second, never exactly the nominal ones."""
+        return self.arm_rate_hz or (499.96 if self.arm_model.endswith("e") else 124.99)

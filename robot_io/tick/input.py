@@ -42,6 +42,8 @@ class FtInput(msgspec.Struct, frozen=True, gc=False):
     packets_ok: int
     crc_fail: int
     junk_bytes: int
+    bias_jumps: int = 0
+    """How often the sensor's bias has jumped since it started, where its driver can tell."""
 
 
 class HostInput(msgspec.Struct, frozen=True, gc=False):

@@ -1,4 +1,4 @@
-"""The arm's own process: reads the UR10 with the ur_rtde wheel and publishes one shared record at 125 Hz.
+"""The arm's own process: reads a UR with the ur_rtde wheel and publishes each of its packets as one shared record.
 
 `python -m robot_io.ur10.child` with an `ArmJob` on stdin. It is a process because the wheel can abort, hang or
 hold the interpreter; whoever reads the record needs to know none of that, only its age. With `hold = "monitor"`
@@ -35,11 +35,13 @@ from robot_io.look_up import addresses_of
 from robot_io.messages import ArmError, ArmRecord, LinkState
 from robot_io.ur10.job import ArmJob
 from robot_io.ur10.preflight import preflight
-from robot_io.ur10.reader import POLL_NS, ArmReader
+from robot_io.ur10.reader import ArmReader
 from robot_io.ur10.servo import ActiveHold
 
 PUBLISH_NS = 8 * NS_PER_MS
 """A record is written for every new packet, and at least this often."""
+MOST_POLL_NS = 2 * NS_PER_MS
+"""A new packet is looked for this often, and at least twice in a cycle of the controller."""
 FATAL = (ArmError.LINK_LOST, ArmError.TIME_WENT_BACK)
 
 _CAUSE = {
@@ -80,6 +82,8 @@ class ArmProcess:
         self._hold = hold
         self._ending = ending
         self._pid = os.getpid()
+        self._cycle_ns = reader.generation.cycle_ns
+        self._poll_ns = min(MOST_POLL_NS, self._cycle_ns // 2)
         self._published_ns = 0
         self._publish(monotonic_ns(), LinkState.UP, reader.error)
 
@@ -97,13 +101,13 @@ class ArmProcess:
             if error in FATAL:
                 self._give_up(error)
             if self._hold is not None and now_ns >= command_ns:
-                command_ns = max(command_ns + PUBLISH_NS, now_ns - PUBLISH_NS)
+                command_ns = max(command_ns + self._cycle_ns, now_ns - self._cycle_ns)
                 error = self._hold.tick(self._reader, now_ns)
                 if error != ArmError.NONE:
                     self._give_up(error)
             if fresh or now_ns - self._published_ns >= PUBLISH_NS:
                 self._publish(now_ns, LinkState.UP, error)
-            deadline_ns = _sleep_until_next(deadline_ns)
+            deadline_ns = _sleep_until_next(deadline_ns, self._poll_ns)
         if self._hold is not None:
             self._hold.end()
         self._publish(monotonic_ns(), LinkState.CLOSED, ArmError.NONE)
@@ -124,12 +128,12 @@ class ArmProcess:
         self._record.publish(record)
 
 
-def _sleep_until_next(deadline_ns: int) -> int:
+def _sleep_until_next(deadline_ns: int, poll_ns: int) -> int:
     """Sleep to the next absolute deadline, skipping the ones already missed; return it."""
     now_ns = monotonic_ns()
-    deadline_ns += POLL_NS
+    deadline_ns += poll_ns
     if deadline_ns <= now_ns:
-        deadline_ns += (now_ns - deadline_ns) // POLL_NS * POLL_NS + POLL_NS
+        deadline_ns += (now_ns - deadline_ns) // poll_ns * poll_ns + poll_ns
     time.sleep((deadline_ns - now_ns) / NS_PER_S)
     return deadline_ns
 
@@ -137,10 +141,10 @@ def _sleep_until_next(deadline_ns: int) -> int:
 def hold_arm(job: ArmJob, record: TypedRecord[ArmRecord], status: StatusPipe) -> NoReturn:
     """Connect, report ready, publish until told to end; then end this process. Raises DeviceError."""
     job = replace(job, host=addresses_of(job.host, where=job.host)[0])  # the wheel would look it up without a deadline
-    info = preflight(job.host)
+    info, generation = preflight(job.host, job.model)
     threads_priority = RECEIVER_PRIORITY if job.realtime_priority > 0 else 0
     with starting_threads_at(threads_priority):
-        reader = ArmReader(job.host)
+        reader = ArmReader(job.host, generation)
     reader.wait_flowing()
     ending = Ending()  # before this, SIGTERM ends the process at once, in a wheel that hangs as well
     hold = None

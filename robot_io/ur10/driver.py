@@ -1,7 +1,8 @@
-"""The UR10, held still: its driver, and the reader that the control process uses.
+"""A UR arm, held still: its driver, and the reader that the control process uses.
 
-The `ur_rtde` wheel runs in a child process that publishes a shared record, 125 times a second; abort, hang and crash
-of that process all look the same from here: the record grows old. The child never connects again by itself.
+The `ur_rtde` wheel runs in a child process that publishes a shared record for every packet of the controller;
+abort, hang and crash of that process all look the same from here: the record grows old. The child never connects
+again by itself.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from robot_io.messages import (
     LinkState,
     Stamped,
 )
+from robot_io.ur10.generation import wanted_model
 from robot_io.ur10.job import ArmJob, Hold
 
 START_WITHIN_S: dict[Hold, float] = {"monitor": 7.0, "servo": 10.0}
@@ -64,12 +66,16 @@ class ArmLink:
 
 
 class Ur10(DriverBase):
-    """A UR10 (CB3, PolyScope 3.15) that holds still: joint positions (rad) and velocities (rad/s).
+    """A UR arm that holds still: joint positions (rad) and velocities (rad/s).
+
+    CB3 (UR3, UR5, UR10; PolyScope 3.15 or a newer 3.x) at 125 Hz, e-Series (UR3e, UR5e, UR10e, UR16e; PolyScope 5.4 or
+    a newer 5.x) at 500 Hz: which one it is, the controller says.
 
     host: the controller's name or address; ports 29999 (dashboard) and 30004 (RTDE) are used, for `servo` 30003 too.
     hold: `"monitor"` sends nothing that could move the arm, and the controller's own position loop holds it;
         `"servo"` commands the joints measured at the start, with the controller-side watchdog armed, and refuses to
         begin while a program plays or the arm moves.
+    model: which arm it must be (`"UR10e"`); empty for any.
     held_pose_rad: six joints (rad) at which `servo` must find the arm; None: wherever it is.
     held_pose_tolerance_rad: how far each joint may be from that pose at the start (rad).
 
@@ -82,11 +88,13 @@ class Ur10(DriverBase):
         host: str,
         *,
         hold: Hold = "monitor",
+        model: str = "",
         held_pose_rad: Joints | None = None,
         held_pose_tolerance_rad: float = 0.05,
     ) -> None:
         self.host = host
         self._hold: Hold = hold
+        self._model = model
         self._held_pose_rad = held_pose_rad
         self._tolerance_rad = held_pose_tolerance_rad
         self._child: Child | None = None
@@ -99,24 +107,28 @@ class Ur10(DriverBase):
 
     @classmethod
     def from_rig(cls, address: str, options: Mapping[str, Any]) -> Self:
-        """Return the arm at a rig's host; `options` has how it is held and where, and no others."""
-        left = dict(options)
+        """Return the arm at a rig's host; `options` has how it is held and where, its `model`, and no others."""
+        left: dict[str, Any] = dict(options)
+        model = wanted_model(left)
+        left.pop("model", None)
         shared = {name: left.pop(name) for name in ("hold", "held_pose_rad", "held_pose_tolerance_rad") if name in left}
         no_more_options("ur", left)
-        return cls(address, **shared)
+        return cls(address, model=model, **shared)
 
     def open(self) -> DeviceInfo:
         """Start the arm's process and wait until it has published; at most 7 s, `servo` 10 s.
 
-        Raises DeviceUnreachable (no answer, no packets, not ready in time), DeviceProtocolError (no UR10, another
-        PolyScope), DeviceNotReady (off, stopped by safety; for `servo` also moving, playing a program or elsewhere) or
-        DeviceError (open already). That process dies with the thread that calls this: open the arm in one that lives as
-        long as you need it.
+        Raises DeviceUnreachable (no answer, no packets, not ready in time), DeviceProtocolError (no UR, another
+        model or PolyScope), DeviceNotReady (off, stopped by safety; for `servo` also moving, playing a program or
+        elsewhere) or DeviceError (open already). That process dies with the thread that calls this: open the arm in
+        one that lives as long as you need it.
         """
         if self._child is not None:
             raise DeviceError("the arm is already open", where=self.host)
         record = TypedRecord.create("arm", ARM_RECORD)
-        job = ArmJob(self.host, self._hold, record.fd, os.getpid(), self._held_pose_rad, self._tolerance_rad)
+        job = ArmJob(
+            self.host, self._hold, record.fd, os.getpid(), self._model, self._held_pose_rad, self._tolerance_rad
+        )
         try:
             self._link = ArmLink(record.fd)
             self._stopped = False
@@ -158,7 +170,7 @@ class Ur10(DriverBase):
     def health(self) -> DeviceHealth:
         """Return the link state as the arm's process last said, LOST when that process is gone.
 
-        Counts `packets`; the rate (Hz) is that of the controller's packets since `start`, 125 when all is well.
+        Counts `packets`; the rate (Hz) is that of the controller's packets since `start`: 125 (CB3) or 500 (e-Series).
         """
         record = self.read() or NO_ARM
         state, cause = LinkState(record.link), ""

@@ -23,6 +23,8 @@ class ArmJob(msgspec.Struct, frozen=True):
     """Of a `TypedRecord` of `ARM_RECORD`."""
     parent_pid: int
     """The process ends when the thread that started it does."""
+    model: str = ""
+    """Which arm it must be (`UR10e`); empty: any."""
     held_pose_rad: Joints | None = None
     """Where the arm must be for active holding; None: wherever it is."""
     held_pose_tolerance_rad: float = 0.05

@@ -2,7 +2,7 @@
 
 The dashboard is asked questions; the RTDE connection receives. To learn whether the inputs that active holding needs
 are free, an RTDE connection asks for them, hears whether it may have them, and closes: no value is written.
-Sources: RTDE guide, dashboard server manual CB3.
+Sources: RTDE guide, dashboard server manuals CB3 and e-Series.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import msgspec
 
 from robot_io.errors import DeviceProtocolError, DeviceUnreachable
 from robot_io.messages import Vector6
+from robot_io.ur10.generation import Generation, generation_of
 from robot_io.ur10.plain_connection import (
     DASHBOARD_PORT,
     GREETING,
@@ -23,12 +24,11 @@ from robot_io.ur10.plain_connection import (
     PlainConnection,
     not_a_robot,
 )
-from robot_io.ur10.preflight import ASK_PROTOCOL_2
+from robot_io.ur10.preflight import begin_rtde, safety_of
 from robot_io.ur10.state import UrModes
 
 SCRIPT_PORT = 30003
-PACKETS = 25
-"""A fifth of a second at 125 Hz."""
+RECEIVE_S = 0.2
 LOOK_WITHIN_S = 3.0
 INPUTS = tuple([f"input_int_register_{i}" for i in range(8)] + [f"input_double_register_{i}" for i in range(18)])
 """What ur_rtde's control interface claims for active holding (without the external force)."""
@@ -36,7 +36,7 @@ INPUTS = tuple([f"input_int_register_{i}" for i in range(8)] + [f"input_double_r
 _OUTPUTS = (
     "timestamp,actual_q,actual_qd,robot_mode,joint_mode,safety_mode,runtime_state,robot_status_bits,safety_status_bits"
 )
-_TYPES = b"DOUBLE,VECTOR6D,VECTOR6D,INT32,VECTOR6INT32,INT32,UINT32,UINT32,UINT32"
+_TYPES = "DOUBLE,VECTOR6D,VECTOR6D,INT32,VECTOR6INT32,INT32,UINT32,UINT32,UINT32"
 _LAYOUT = struct.Struct(">d6d6di6iiIII")
 
 
@@ -59,7 +59,7 @@ class ArmPacket(msgspec.Struct, frozen=True):
     modes: UrModes
 
 
-def ask_dashboard(host: str) -> DashboardWords:
+def ask_dashboard(host: str, generation: Generation) -> DashboardWords:
     """Ask model, serial number, modes and whether a program runs. Raises DeviceUnreachable or DeviceProtocolError."""
     with PlainConnection(host, DASHBOARD_PORT, time.monotonic() + LOOK_WITHIN_S) as dashboard:
         greeting = dashboard.read_line()
@@ -69,31 +69,44 @@ def ask_dashboard(host: str) -> DashboardWords:
             dashboard.ask("get robot model"),
             dashboard.ask("get serial number"),
             dashboard.ask_value("robotmode", "Robotmode: "),
-            dashboard.ask_value("safetymode", "Safetymode: "),
+            safety_of(dashboard, generation),
             dashboard.ask_value("running", "Program running: ") == "true",
         )
 
 
 def receive(host: str) -> list[ArmPacket]:
-    """Return 25 packets in a row. Raises DeviceUnreachable or DeviceProtocolError."""
-    with _rtde(host) as rtde:
-        rtde.send(_frame("O", struct.pack(">d", 125.0) + _OUTPUTS.encode()))
-        answer = rtde.read_frame("O")
-        if answer[1:] != _TYPES:
-            raise DeviceProtocolError(
-                f"it gives {answer[1:].decode('ascii', 'replace')[:120]!r} for the values asked for",
-                where=rtde.where,
-                do="A CB3 controller with PolyScope 3.15 gives them all",
-            )
-        rtde.send(_frame("S", b""))
-        if rtde.read_frame("S") != b"\x01":
-            raise DeviceProtocolError("it does not start to send", where=rtde.where, do="Restart the controller")
-        return [_packet(rtde.where, rtde.read_frame("U")) for _ in range(PACKETS)]
+    """Return the packets of a fifth of a second, in a row. Raises DeviceUnreachable or DeviceProtocolError."""
+    with PlainConnection(host, RTDE_PORT, time.monotonic() + LOOK_WITHIN_S) as rtde:
+        rate_hz = generation_of(host, begin_rtde(rtde)).rate_hz
+        ask_outputs(rtde, rate_hz, _OUTPUTS, _TYPES)
+        ask_to_send(rtde)
+        return [_packet(rtde.where, rtde.read_frame("U")) for _ in range(round(RECEIVE_S * rate_hz))]
+
+
+def ask_outputs(rtde: PlainConnection, rate_hz: float, names: str, types: str = "") -> str:
+    """Ask for the values of `names` at a rate and return their types. Raises DeviceProtocolError unless `types`."""
+    rtde.send(_frame("O", struct.pack(">d", rate_hz) + names.encode()))
+    given = rtde.read_frame("O")[1:].decode("ascii", "replace")
+    if types and given != types:
+        raise DeviceProtocolError(
+            f"it gives {given[:120]!r} for the values asked for",
+            where=rtde.where,
+            do="PolyScope 3.15 (CB3) and 5.4 (e-Series) give them all",
+        )
+    return given
+
+
+def ask_to_send(rtde: PlainConnection) -> None:
+    """Have the values sent that were asked for. Raises DeviceUnreachable or DeviceProtocolError."""
+    rtde.send(_frame("S", b""))
+    if rtde.read_frame("S") != b"\x01":
+        raise DeviceProtocolError("it does not start to send", where=rtde.where, do="Restart the controller")
 
 
 def inputs_in_use(host: str) -> list[str]:
     """Return the inputs of active holding that another client holds; no value is written. Raises as `receive`."""
-    with _rtde(host) as rtde:
+    with PlainConnection(host, RTDE_PORT, time.monotonic() + LOOK_WITHIN_S) as rtde:
+        begin_rtde(rtde)
         rtde.send(_frame("I", ",".join(INPUTS).encode()))
         answer = rtde.read_frame("I")
         types = answer[1:].decode("ascii", "replace").split(",")
@@ -108,18 +121,6 @@ def accepts_scripts(host: str) -> None:
         raise DeviceUnreachable(
             f"cannot connect ({error})", where=f"{host}:{SCRIPT_PORT}", do="Check that nothing filters this port"
         ) from error
-
-
-def _rtde(host: str) -> PlainConnection:
-    rtde = PlainConnection(host, RTDE_PORT, time.monotonic() + LOOK_WITHIN_S)
-    try:
-        rtde.send(ASK_PROTOCOL_2)
-        if rtde.read_frame("V") != b"\x01":
-            raise DeviceProtocolError("it does not speak RTDE protocol 2", where=rtde.where)
-    except BaseException:
-        rtde.__exit__()
-        raise
-    return rtde
 
 
 def _frame(kind: str, body: bytes) -> bytes:

@@ -1,6 +1,6 @@
 """A plain TCP connection to a UR controller on which every step has a deadline: dashboard lines and RTDE frames.
 
-Sources: RTDE guide (framing, protocol 2), dashboard server manual CB3.
+Sources: RTDE guide (framing, protocol 2), dashboard server manuals CB3 and e-Series.
 """
 
 from __future__ import annotations
@@ -39,7 +39,20 @@ class PlainConnection:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection; idempotent."""
         self._socket.close()
+
+    def give_time(self, seconds: float) -> None:
+        """Let the next steps take this long from now on."""
+        self._deadline_s = time.monotonic() + seconds
+
+    def detach(self) -> tuple[socket.socket, bytes]:
+        """Return the socket and what was received and not yet read; without deadlines from now on."""
+        unread, self._unread = self._unread, b""
+        return self._socket, unread
 
     def send(self, data: bytes) -> None:
         """Send all of `data`."""

@@ -1,9 +1,9 @@
-"""Look at a UR10 with plain sockets before the ur_rtde wheel touches it.
+"""Look at a UR arm with plain sockets before the ur_rtde wheel touches it.
 
 The wheel blocks for ever on a controller that accepts and stays silent, and aborts on one that sends
 something else. Every step here has a deadline of 1 s, all together under 3.5 s, and nothing is sent that could
 move the arm: two RTDE questions and five dashboard questions.
-Sources: RTDE guide (framing, protocol 2), dashboard server manual CB3.
+Sources: RTDE guide (framing, protocol 2), dashboard server manuals CB3 and e-Series.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import time
 
 from robot_io.errors import DeviceNotReady, DeviceProtocolError
 from robot_io.messages import DeviceInfo
+from robot_io.ur10.generation import DASHBOARD_TEXT_LIMIT, Generation, Version, generation_of, model_of
 from robot_io.ur10.plain_connection import (
     DASHBOARD_PORT,
     GREETING,
@@ -23,35 +24,30 @@ from robot_io.ur10.plain_connection import (
 )
 
 TOTAL_TIMEOUT_S = 3.3
-MODEL = "UR10"
-MAJOR = 3
-MIN_MINOR = 15
 
-ASK_PROTOCOL_2 = bytes.fromhex("0005560002")
+_ASK_PROTOCOL_2 = bytes.fromhex("0005560002")
 _ASK_VERSION = bytes.fromhex("000376")
 
 
-def preflight(host: str) -> DeviceInfo:
+def preflight(host: str, model: str = "") -> tuple[DeviceInfo, Generation]:
     """Identify the controller at `host` and require it ready to hold: RUNNING, safety NORMAL or REDUCED.
 
-    Takes at most 3.5 s. Raises DeviceUnreachable (no answer in time), DeviceProtocolError (not a UR10 of CB3
-    3.15 or newer 3.x), DeviceNotReady (not running, or stopped by safety).
+    model: which arm it must be (`UR10e`); empty for any. Takes at most 3.5 s. Raises DeviceUnreachable (no answer in
+    time), DeviceProtocolError (no UR of CB3 3.15 or e-Series 5.4 or newer, another model), DeviceNotReady (not running,
+    or stopped by safety).
     """
     deadline_s = time.monotonic() + TOTAL_TIMEOUT_S
     version = read_version(host, deadline_s)
-    check_version(host, version)
+    generation = generation_of(host, version)
     with PlainConnection(host, DASHBOARD_PORT, deadline_s) as dashboard:
         greeting = dashboard.read_line()
         if not greeting.startswith(GREETING):
             raise not_a_robot(dashboard.where, f"greeted with {greeting[:80]!r}")
-        model = dashboard.ask("get robot model")
-        if model != MODEL:
-            raise DeviceProtocolError(
-                f"this is a {model[:40]!r}, not a {MODEL}", where=host, do="Give the address of the UR10"
-            )
+        found = model_of(host, generation, dashboard.ask("get robot model"), model)
         serial = dashboard.ask("get serial number")
-        _check_ready(host, dashboard)
-    return DeviceInfo("ur10", host, model, ".".join(map(str, version)), serial if serial.isdigit() else "")
+        _check_ready(host, dashboard, generation)
+    number = ".".join(map(str, version))
+    return DeviceInfo(found.lower(), host, found, number, serial if serial.isdigit() else ""), generation
 
 
 def is_program_running(host: str) -> bool:
@@ -64,38 +60,36 @@ def is_program_running(host: str) -> bool:
     return answer.endswith("true")
 
 
-def read_version(host: str, deadline_s: float) -> tuple[int, int, int, int]:
+def read_version(host: str, deadline_s: float) -> Version:
     """Return the controller's version by RTDE. Raises DeviceUnreachable or DeviceProtocolError."""
     with PlainConnection(host, RTDE_PORT, deadline_s) as rtde:
-        rtde.send(ASK_PROTOCOL_2)
-        accepted = rtde.read_frame("V")
-        if accepted != b"\x01":
-            raise DeviceProtocolError(
-                "it does not speak RTDE protocol 2", where=rtde.where, do="A CB3 controller needs PolyScope 3.15"
-            )
-        rtde.send(_ASK_VERSION)
-        body = rtde.read_frame("v")
-        if len(body) != 16:
-            raise not_a_robot(rtde.where, f"gave a version of {len(body)} bytes")
-        major, minor, bugfix, build = struct.unpack(">4I", body)
-        return major, minor, bugfix, build
+        return begin_rtde(rtde)
 
 
-def check_version(host: str, version: tuple[int, int, int, int]) -> None:
-    """Raise DeviceProtocolError for a controller other than CB3 with PolyScope 3.15 or a newer 3.x."""
-    major, minor = version[:2]
-    if major != MAJOR or minor < MIN_MINOR:
+def begin_rtde(rtde: PlainConnection) -> Version:
+    """Agree on protocol 2 and return the controller's version. Raises DeviceUnreachable or DeviceProtocolError."""
+    rtde.send(_ASK_PROTOCOL_2)
+    if rtde.read_frame("V") != b"\x01":
         raise DeviceProtocolError(
-            f"the controller runs PolyScope {'.'.join(map(str, version))}, this driver needs {MAJOR}.{MIN_MINOR} "
-            f"or a newer {MAJOR}.x",
-            where=host,
-            do="Update the controller, or use a UR10 with a CB3 controller",
+            "it does not speak RTDE protocol 2", where=rtde.where, do="It needs PolyScope 3.15 (CB3) or 5.4 (e-Series)"
         )
+    rtde.send(_ASK_VERSION)
+    body = rtde.read_frame("v")
+    if len(body) != 16:
+        raise not_a_robot(rtde.where, f"gave a version of {len(body)} bytes")
+    major, minor, bugfix, build = struct.unpack(">4I", body)
+    return major, minor, bugfix, build
 
 
-def _check_ready(host: str, dashboard: PlainConnection) -> None:
+def safety_of(dashboard: PlainConnection, generation: Generation) -> str:
+    """Return what the dashboard calls the safety state: NORMAL, PROTECTIVE_STOP, AUTOMATIC_MODE_SAFEGUARD_STOP, ..."""
+    question = generation.safety_question
+    return dashboard.ask_value(question, f"{question.capitalize()}: ")[:DASHBOARD_TEXT_LIMIT]
+
+
+def _check_ready(host: str, dashboard: PlainConnection, generation: Generation) -> None:
     robot_mode = dashboard.ask_value("robotmode", "Robotmode: ")
-    safety_mode = dashboard.ask_value("safetymode", "Safetymode: ")
+    safety_mode = safety_of(dashboard, generation)
     if safety_mode not in ("NORMAL", "REDUCED"):
         raise DeviceNotReady(
             f"the arm is stopped by safety ({safety_mode})",

@@ -11,12 +11,12 @@ import math
 import time
 from typing import Any
 
-from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
+from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.errors import DeviceUnreachable
 from robot_io.messages import ArmError, JointState
+from robot_io.ur10.generation import Generation
 from robot_io.ur10.state import UrModes
 
-FREQUENCY_HZ = 125.0
 VARIABLES = [
     "timestamp",
     "actual_q",
@@ -37,13 +37,14 @@ _KEEP_PRIORITY = -1
 class ArmReader:
     """Connects with the wheel (blocks for ever on a silent controller: run the preflight first) and reads packets."""
 
-    def __init__(self, host: str) -> None:
+    def __init__(self, host: str, generation: Generation) -> None:
         import rtde_receive  # 1.8 MB of C++, needed in the arm's process only
 
         self._host = host
+        self.generation = generation
         try:
             self._rtde: Any = rtde_receive.RTDEReceiveInterface(
-                host, FREQUENCY_HZ, VARIABLES, False, False, _KEEP_PRIORITY
+                host, generation.rate_hz, VARIABLES, False, False, _KEEP_PRIORITY
             )
         except RuntimeError as error:
             raise DeviceUnreachable(
@@ -98,7 +99,7 @@ class ArmReader:
 
     def _snapshot(self) -> tuple[JointState, UrModes] | None:
         rtde = self._rtde
-        for _ in range(3):  # a second tear in a row is impossible: packets are 8 ms apart
+        for _ in range(3):  # a second tear in a row is impossible: packets are 2 or 8 ms apart
             stamp_s = rtde.getTimestamp()
             q, qd, modes = rtde.getActualQ(), rtde.getActualQd(), rtde.getJointMode()
             numbers = (
@@ -120,7 +121,3 @@ class ArmReader:
 def _same(a_s: float, b_s: float) -> bool:
     """Return whether two time stamps are equal, NaN to NaN as well: a stamp that stays NaN must not look like news."""
     return a_s == b_s or (math.isnan(a_s) and math.isnan(b_s))
-
-
-POLL_NS = 2 * NS_PER_MS
-"""How often the child looks for a new packet: a quarter of the controller's cycle."""

@@ -25,7 +25,6 @@ from robot_io.ur10.state import RUNTIME_PLAYING, RUNTIME_STOPPED
 WATCHDOG_HZ = 10.0
 """The controller stops the program when this many commands a second do not arrive (URScript rtde_set_watchdog)."""
 STALE_NS = 100 * NS_PER_MS
-CYCLE_S = 0.008
 LOOKAHEAD_S = 0.1
 GAIN = 300.0
 AT_REST_RAD_PER_S = 0.02
@@ -46,7 +45,8 @@ class ActiveHold:
     def __init__(self, host: str, reader: ArmReader, held_pose_rad: Joints | None, tolerance_rad: float) -> None:
         self.target: Joints = _check_may_start(host, reader, held_pose_rad, tolerance_rad)
         self._tolerance_rad = tolerance_rad
-        self._rtde = _control_interface(host)
+        self._cycle_s = reader.generation.cycle_s
+        self._rtde = _control_interface(host, reader.generation.rate_hz)
         reader.own_program = True
         self._host = host
         self._ended = False
@@ -74,7 +74,7 @@ class ActiveHold:
             raise
 
     def tick(self, reader: ArmReader, now_ns: int) -> ArmError:
-        """Command the target once more, or say why holding is over; call it every 8 ms."""
+        """Command the target once more, or say why holding is over; call it every cycle of the controller."""
         if self._ended or reader.joints is None:
             return ArmError.SERVO_STOPPED
         fault = self._fault(reader, reader.joints, now_ns)
@@ -95,7 +95,7 @@ class ActiveHold:
 
     def _command(self, within_s: float) -> bool:
         with _killed_after(within_s):
-            accepted: bool = self._rtde.servoJ(list(self.target), 0.0, 0.0, CYCLE_S, LOOKAHEAD_S, GAIN)
+            accepted: bool = self._rtde.servoJ(list(self.target), 0.0, 0.0, self._cycle_s, LOOKAHEAD_S, GAIN)
         return accepted
 
     def _fault(self, reader: ArmReader, joints: JointState, now_ns: int) -> ArmError:
@@ -145,13 +145,13 @@ def _check_may_start(host: str, reader: ArmReader, held_pose_rad: Joints | None,
     return start.position
 
 
-def _control_interface(host: str) -> Any:
+def _control_interface(host: str, rate_hz: float) -> Any:
     import rtde_control  # C++, and only for active holding
 
     try:
         return rtde_control.RTDEControlInterface(
             host,
-            1.0 / CYCLE_S,
+            rate_hz,
             rtde_control.RTDEControlInterface.FLAG_UPLOAD_SCRIPT | rtde_control.RTDEControlInterface.FLAG_NO_EXT_FT,
             50002,  # the wheel's default port of its optional UR cap, which is not used
             -1,  # leave this thread's priority alone

@@ -1,7 +1,8 @@
 """What a UR controller's modes and bits mean to a push. Pure; no UR bit leaves this package but packed, for the log.
 
-Source: UR RTDE guide (CB3 3.15): robot_mode, joint_mode, safety_mode, safety_status_bits, robot_status_bits and
-runtime_state.
+The numbers mean the same in both generations; the e-Series has more of them, and each of those is a stop or off.
+Source: UR RTDE guide (CB3 3.15, e-Series 5.12): robot_mode, joint_mode, safety_mode, safety_status_bits,
+robot_status_bits and runtime_state.
 """
 
 from __future__ import annotations

@@ -34,6 +34,8 @@ def check(
         faults += _of_reading(settings, force, torque, control)
     if inp.ft.link == LinkState.LOST:
         faults.append("F02")
+    if inp.ft.bias_jumps:
+        faults.append("F15")
     age_ns = inp.now_ns - last_ns
     if age_ns > STALE_STOP_NS:
         faults.append(Finding("F01-stop", age_ns / NS_PER_MS))

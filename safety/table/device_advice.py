@@ -85,6 +85,10 @@ DEVICE_ADVICE: dict[str, Advice] = {
         "The sensor sends slowly, packets are lost, or the adapter bunches them.",
         "Set the adapter's latency timer to 1 ms; compare `packets_ok` with the declared rate.",
     ),
+    "F15": Advice(
+        "Somebody zeroed the arm's sensor or changed its payload at the pendant, or the sensor was overloaded.",
+        "Leave zero and payload alone during a run. Where nobody touched them, look at the arm's log; then tare again.",
+    ),
     "F20": Advice(
         "The force pushed the arm away from its pose, or it sank after its brakes were released.",
         "Bring the arm back to its held pose and tare again; use its brakes or a stiffer pose if it comes again.",

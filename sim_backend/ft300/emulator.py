@@ -12,8 +12,8 @@ import termios
 from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ft300 import wire
-from sim_backend.ft300.knobs import Ft300Knobs
-from sim_backend.ft300.line import WireDirection, next_delivery_ns
+from sim_backend.ft300.knobs import Ft300Knobs, damaged, is_every_nth
+from sim_backend.ft300.line import BYTE_NS, WireDirection, last_delivery_ns, next_delivery_ns
 from sim_backend.ft300.pty import READ_BYTES, PtyPort
 from sim_backend.ft300.registers import OUTPUT_STREAM, SensorRegisters
 from sim_backend.ft300.timers import NamedTimers, nanoseconds
@@ -58,7 +58,7 @@ class Ft300Emulator:
         self._streams_at_boot = streaming
         self._streaming = streaming
         self._registers = SensorRegisters(firmware, serial, year, acceleration_g)
-        self._port = PtyPort(loop, self._on_bytes, self._on_sent, link)
+        self._port = PtyPort(loop, self._on_bytes, self._on_opened, link)
         self._to_host = WireDirection(paced=self.knobs.paced)
         self._to_sensor = WireDirection(paced=self.knobs.paced)
         self._scanner = wire.RequestScanner()
@@ -69,6 +69,7 @@ class Ft300Emulator:
         self._modbus_from_ns = 0
         self._stalled_until_ns = 0
         self._heard_until_ns = 0
+        self._opened_ns = 0
         self._packets = 0
         self._answers = 0
         self._counted = dict.fromkeys(
@@ -153,21 +154,11 @@ class Ft300Emulator:
     def _send_packet(self, sample_ns: int) -> None:
         self._packets += 1
         knobs = self.knobs
-        if self._to_host.is_busy(sample_ns) or self._is_every_nth(knobs.drop_packet_every):
+        if self._to_host.is_busy(sample_ns) or is_every_nth(self._packets, knobs.drop_packet_every):
             self._counted["packets_withheld"] += 1
             return
-        packet = bytearray(wire.stream_packet(self._registers.counts))
-        if self._is_every_nth(knobs.corrupt_every):
-            packet[5] ^= 0x10
-        if self._is_every_nth(knobs.drop_byte_every):
-            del packet[7]
-        if self._is_every_nth(knobs.insert_byte_every):
-            packet.insert(9, 0x20)
         self._counted["packets_sent"] += 1
-        self._send(bytes(packet), sample_ns)
-
-    def _is_every_nth(self, every: int) -> bool:
-        return every > 0 and self._packets % every == 0
+        self._send(damaged(wire.stream_packet(self._registers.counts), self._packets, knobs), sample_ns)
 
     # From the sensor to the host: line, adapter, pty.
 
@@ -175,16 +166,19 @@ class Ft300Emulator:
         self._to_host.put(data, at_ns)
         self._schedule_delivery()
 
-    def _schedule_delivery(self) -> None:
+    def _schedule_delivery(self, *, anew: bool = False) -> None:
         # While nobody is connected, one wake-up per packet is enough.
         arrival_ns = self._to_host.next_ns() if self._port.attached else self._to_host.free_ns
-        if len(self._to_host) and arrival_ns is not None and "deliver" not in self._timers:
-            self._timers.at("deliver", next_delivery_ns(arrival_ns, self.latency_ms), self._on_delivery)
+        if len(self._to_host) and arrival_ns is not None and (anew or "deliver" not in self._timers):
+            due_ns = next_delivery_ns(arrival_ns, self.latency_ms, self._opened_ns)
+            self._timers.at("deliver", due_ns, self._on_delivery)
 
     def _on_delivery(self, deadline_ns: int) -> None:
+        self._port.look()
+        self._hear_due()  # a stop that has been heard by now ends what is delivered
+        self._lose_what_came_before()
         # Everything due by now: after a late wake-up, all that the adapter would have delivered meanwhile.
-        timer_ns = max(self.latency_ms, 1) * NS_PER_MS
-        due_ns = monotonic_ns() // timer_ns * timer_ns if self.latency_ms else monotonic_ns()
+        due_ns = last_delivery_ns(monotonic_ns(), self.latency_ms, self._opened_ns)
         began_ns = self._to_host.next_began_ns() or deadline_ns
         data = self._to_host.take(max(due_ns, deadline_ns))
         if self.knobs.collisions and self._to_sensor.free_ns > began_ns:
@@ -216,14 +210,17 @@ class Ft300Emulator:
             self._port.pause()
         self._schedule_hearing()
 
-    def _on_sent(self) -> None:
-        """Process what is still in transit: closing a real port waits until everything has been sent."""
-        now_ns = monotonic_ns()
-        began_ns = self._to_sensor.next_began_ns()
-        data = self._to_sensor.take(self._to_sensor.free_ns)
-        self._to_sensor.clear()
-        if began_ns is not None and not self._is_stalled(now_ns):
-            self._hear(data, began_ns, now_ns)
+    def _on_opened(self) -> None:
+        """Take the port for open from when all that was written before has been sent: a real one is not closed before,
+        and not within the byte that is then on its way to the host. Opening resets the adapter.
+        """
+        now_ns, sent_ns = monotonic_ns(), self._to_sensor.free_ns
+        self._opened_ns = now_ns if sent_ns <= now_ns else sent_ns + BYTE_NS
+        self._lose_what_came_before()
+        self._schedule_delivery(anew=True)
+
+    def _lose_what_came_before(self) -> None:
+        self._counted["bytes_lost"] += len(self._to_host.take(self._opened_ns))
 
     def _schedule_hearing(self) -> None:
         if len(self._to_sensor) and "hear" not in self._timers:
@@ -231,6 +228,10 @@ class Ft300Emulator:
             self._timers.at("hear", heard_ns, self._on_hearing)
 
     def _on_hearing(self, _deadline_ns: int) -> None:
+        self._hear_due()
+        self._schedule_hearing()
+
+    def _hear_due(self) -> None:
         now_ns = monotonic_ns()
         began_ns = self._to_sensor.next_began_ns()
         data = self._to_sensor.take(now_ns)
@@ -238,7 +239,6 @@ class Ft300Emulator:
             self._port.resume()
         if data and began_ns is not None and not self._is_stalled(now_ns):
             self._hear(data, began_ns, now_ns)
-        self._schedule_hearing()
 
     def _hear(self, data: bytes, began_ns: int, now_ns: int) -> None:
         # Pauses are measured on the line: late processing on this host is not a pause of the client.
@@ -251,7 +251,7 @@ class Ft300Emulator:
                 self._scanner.clear()
             for request in self._scanner.feed(data):
                 self._counted["requests"] += 1
-                self._serve(request, now_ns)
+                self._serve(request, self._to_sensor.taken_ns())
 
     def _find_stop(self, data: bytes, now_ns: int) -> bytes:
         """Count 0xFF; a streaming sensor ignores everything else. Return the bytes after the stop."""
@@ -259,32 +259,32 @@ class Ft300Emulator:
             self._stop_bytes_seen = self._stop_bytes_seen + 1 if byte == wire.STOP_BYTE else 0
             if self._stop_bytes_seen >= self.knobs.stop_bytes:
                 self._streaming = False
+                self._to_host.cut(self._to_sensor.taken_ns(len(data) - index))
                 self._registers.output = 0
                 self._counted["stops"] += 1
                 self._modbus_from_ns = now_ns + nanoseconds(self.knobs.mode_change_ms)
                 return data[index:]
         return b""
 
-    def _serve(self, request: bytes, now_ns: int) -> None:
+    def _serve(self, request: bytes, heard_ns: int) -> None:
         reply = self._registers.serve(request)
         selected = reply.selected
         if selected is not None:
             self._timers.at(
                 "answer",
-                now_ns + nanoseconds(self.knobs.ack_delay_ms),
+                heard_ns + nanoseconds(self.knobs.ack_delay_ms),
                 lambda at_ns: self._select(selected, reply.answer, at_ns),
             )
         elif self.knobs.unknown == "exception" or not reply.is_refusal:
             answer = self._perhaps_damaged(reply.answer)
             self._timers.at(
-                "answer", now_ns + nanoseconds(self.knobs.answer_delay_ms), lambda at_ns: self._send(answer, at_ns)
+                "answer", heard_ns + nanoseconds(self.knobs.answer_delay_ms), lambda at_ns: self._send(answer, at_ns)
             )
 
     def _perhaps_damaged(self, answer: bytes) -> bytes:
         self._answers += 1
-        every = self.knobs.corrupt_answer_every
-        damaged = every > 0 and self._answers % every == 0
-        return answer[:-1] + bytes((answer[-1] ^ 0x10,)) if damaged else answer
+        wrong = is_every_nth(self._answers, self.knobs.corrupt_answer_every)
+        return answer[:-1] + bytes((answer[-1] ^ 0x10,)) if wrong else answer
 
     def _select(self, selected: int, answer: bytes, at_ns: int) -> None:
         self._registers.output = selected

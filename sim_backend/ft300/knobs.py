@@ -32,3 +32,20 @@ class Ft300Knobs(msgspec.Struct, frozen=True):
     drop_byte_every: int = 0
     insert_byte_every: int = 0
     drop_packet_every: int = 0
+
+
+def damaged(packet: bytes, number: int, knobs: Ft300Knobs) -> bytes:
+    """Return the packet of that number as the knobs have it sent."""
+    sent = bytearray(packet)
+    if is_every_nth(number, knobs.corrupt_every):
+        sent[5] ^= 0x10
+    if is_every_nth(number, knobs.drop_byte_every):
+        del sent[7]
+    if is_every_nth(number, knobs.insert_byte_every):
+        sent.insert(9, 0x20)
+    return bytes(sent)
+
+
+def is_every_nth(number: int, every: int) -> bool:
+    """Return whether it is that one's turn; never where `every` is 0."""
+    return every > 0 and number % every == 0

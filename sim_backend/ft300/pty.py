@@ -3,7 +3,8 @@
 The slave is not held open here, so that `fuser` shows only the client; the kernel then reports a hang-up while
 nobody has it open, and bytes sent meanwhile are lost, as with a real port. Not modelled: parity (a pty refuses
 to set it), modem lines, and the size of a real port's buffers (a pty keeps up to 64 kB for a client that has
-it open and does not read).
+it open and does not read). Closing a real port waits until everything is sent; closing a pty does not wait, so the
+emulator takes the port for closed until then.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 from robot_io.clock import NS_PER_MS
 from robot_io.errors import EnvironmentFault
 from robot_io.ipc.event_loop import HANGUP, READ, EventLoop, Timer
+from sim_backend.ft300.pty_watch import PtyWatch
 
 LOOK_PERIOD_NS = 5 * NS_PER_MS
 READ_BYTES = 2048
@@ -29,22 +31,23 @@ BAUD_AT_FIRST = termios.B9600
 class PtyPort:
     """A pty with its slave in raw mode, served in `loop`; bytes from the client go to `on_bytes`.
 
-    `on_sent` is called when the client has closed its port: closing a real port waits until everything is sent (Linux).
+    `on_opened` is called when a client has opened the port, after the bytes of the one before.
     """
 
     def __init__(
         self,
         loop: EventLoop,
         on_bytes: Callable[[bytes], None],
-        on_sent: Callable[[], None],
+        on_opened: Callable[[], None],
         link: str | None = None,
     ) -> None:
         self._loop = loop
         self._on_bytes = on_bytes
-        self._on_sent = on_sent
+        self._on_opened = on_opened
         self._link = Path(link) if link else None
         self._master = -1
         self._look: Timer | None = None
+        self._watch: PtyWatch | None = None
         self._hang_up_poll = select.poll()
         self._paused = False
         self.path = ""
@@ -75,6 +78,9 @@ class PtyPort:
         os.set_blocking(self._master, False)
         self._hang_up_poll = select.poll()
         self._hang_up_poll.register(self._master, select.POLLIN)  # a hang-up is always reported
+        self._watch = PtyWatch(self.path)
+        if self._watch.fileno() >= 0:
+            self._loop.add_fd(self._watch.fileno(), self._on_watch)
         if self._link is not None:
             beside = self._link.with_name(f"{self._link.name}.{os.getpid()}")
             beside.symlink_to(self.path)
@@ -89,6 +95,10 @@ class PtyPort:
         if self._look is not None:
             self._look.cancel()
             self._look = None
+        if self._watch is not None:
+            self._loop.remove_fd(self._watch.fileno())
+            self._watch.close()
+            self._watch = None
         self._loop.remove_fd(self._master)
         os.close(self._master)
         self._master = -1
@@ -123,6 +133,21 @@ class PtyPort:
             self._loop.set_events(self._master, READ)
         self._paused = False
 
+    def look(self) -> None:
+        """Notice at once who has opened or closed the port."""
+        if self._watch is not None:
+            self._on_watch(0)
+
+    def _on_watch(self, _events: int) -> None:
+        assert self._watch is not None
+        if not self.attached:
+            self._on_look(0)
+        elif self._watch.reopened():
+            self._take_rest()
+            self._watch.flush()
+            self.attaches += 1
+            self._on_opened()
+
     def _await_client(self) -> None:
         self.attached = False
         self._look = self._loop.call_every(LOOK_PERIOD_NS, self._on_look)
@@ -132,41 +157,40 @@ class PtyPort:
 
         A client may have opened, written and closed it since the last check.
         """
-        state = next((events for _, events in self._hang_up_poll.poll(0)), 0)
-        if state & select.POLLHUP:
-            while state & select.POLLIN and (data := self._read()):
-                self._on_bytes(data)
-                self._on_sent()
-            return
+        assert self._watch is not None
         assert self._look is not None
+        reopened = self._watch.reopened()
+        state = next((events for _, events in self._hang_up_poll.poll(0)), 0)
+        if reopened or state & select.POLLHUP:
+            self._take_rest()
+        if state & select.POLLHUP:
+            return
         self._look.cancel()
         self._look = None
         self.attached = True
         self.attaches += 1
         self._paused = False
         self._loop.add_fd(self._master, self._on_ready)
+        self._on_opened()
 
     def _on_ready(self, events: int) -> None:
-        if data := self._read() if events & (READ | HANGUP) else b"":
-            self._on_bytes(data)
         if not events & HANGUP:
+            if data := self._read():
+                self._on_bytes(data)
             return
         # At once: the client may open it again within a millisecond, and then the hang-up is gone.
+        assert self._watch is not None
+        self._take_rest()
+        self._loop.remove_fd(self._master)
+        self._watch.flush()
+        self._watch.nobody()
+        self._await_client()
+
+    def _take_rest(self) -> None:
         while data := self._read():
             self._on_bytes(data)
-        self._loop.remove_fd(self._master)
-        self._forget_unread()
-        self._on_sent()
-        self._await_client()
 
     def _read(self) -> bytes:
         with contextlib.suppress(OSError):  # EIO: the client closed it; EAGAIN: nothing
             return os.read(self._master, READ_BYTES)
         return b""
-
-    def _forget_unread(self) -> None:
-        """Drop what the client left unread, as closing a real port does; a pty keeps it for the next client."""
-        with contextlib.suppress(OSError):
-            slave = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-            termios.tcflush(slave, termios.TCIFLUSH)
-            os.close(slave)

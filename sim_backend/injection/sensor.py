@@ -42,6 +42,7 @@ class InjectedSensor:
         self._lost = [fault for fault in faults if fault.word.kind == "lost"]
         self._crc = [fault for fault in faults if fault.word.kind == "crc"]
         self._junk = [fault for fault in faults if fault.word.kind == "junk"]
+        self._zeroed = [fault for fault in faults if fault.word.kind == "zeroed"]
         self._dropping = [fault for fault in faults if fault.word.kind in ("off", "slow", "intermittent")]
         self._stages = [_stage(fault, rig) for fault in faults if fault not in self._lost]
         self._gone = False
@@ -70,8 +71,9 @@ class InjectedSensor:
             "crc_fail": damaged + torn,
             "junk_bytes": torn * JUNK_BYTES,
             "resyncs": torn,
+            "bias_jumps": sum(fault.changed > 0 for fault in self._zeroed),
         }
-        if more["packets_ok"]:
+        if any(more.values()):
             counters = health.counters | {name: health.counters.get(name, 0) + by for name, by in more.items() if by}
             health = replace(health, counters=counters)
         return replace(health, state=LinkState.LOST, cause="injected") if self._gone else health
@@ -100,10 +102,15 @@ def _change(word: FaultWord, rig: RigConfig) -> changes.Change:
         "mirrored": changes.mirrored,
         "drifting": changes.drifting,
         "dead-axis": changes.dead_axis,
+        "zeroed": _zeroed,
         "turned": changes.turned_about(rig.frames.base_from_sensor[2]),
         "saturated": _saturated(rig),
     }
     return _spikes(word.value[0]) if word.kind == "spike" else simple[word.kind]
+
+
+def _zeroed(now: changes.Numbers, first: changes.Numbers, _value: changes.Numbers, _since_s: float) -> changes.Numbers:
+    return tuple(reads - then for reads, then in zip(now, first, strict=True))
 
 
 def _saturated(rig: RigConfig) -> changes.Change:

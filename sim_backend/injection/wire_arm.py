@@ -39,7 +39,7 @@ _DEEDS: dict[str, Callable[[UrEmulator, tuple[float, ...]], None]] = {
     "dashboard-silent": lambda arm, _: arm.mute_dashboard(),
     "truncated": lambda arm, value: arm.truncate_all_data(round(value[0])),
     "version": _version,
-    "other-model": lambda arm, _: arm.be_model("UR5"),
+    "other-model": lambda arm, _: arm.be_model("UR20"),
     "protective-stop": lambda arm, _: arm.protective_stop(),
     "emergency-stop": lambda arm, _: arm.emergency_stop(),
     "safeguard-stop": lambda arm, _: arm.safeguard_stop(),

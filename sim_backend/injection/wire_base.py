@@ -41,6 +41,8 @@ _DEEDS: dict[tuple[str, str], Callable[[BridgeFaults, tuple[float, ...]], None]]
     ("base", "silent"): lambda bridge, _: bridge.freeze(FOR_GOOD_S),
     ("base", "lag"): lambda bridge, value: bridge.lag(value[0]),
     ("base", "no-rosapi"): lambda bridge, _: bridge.no_rosapi(),
+    ("base", "cold"): lambda bridge, value: bridge.cold(value[0]),
+    ("base", "slow-answers"): lambda bridge, value: bridge.slow_answers(value[0]),
     ("base", "no-listener"): lambda bridge, _: bridge.subscriber_missing(),
     ("base", "second-publisher"): lambda bridge, _: bridge.other_publisher(),
     ("base", "second-client"): lambda bridge, _: bridge.other_client(),

@@ -18,6 +18,7 @@ from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.injection.injection import Injection
 from sim_backend.injection.sensor import InjectedSensor
 from sim_backend.injection.wire_words import WireFault
+from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.world.plant import FtSource
 
 FOR_GOOD_S = 1e6
@@ -34,6 +35,19 @@ def spoil_sensor(emulator: Ft300Emulator, faults: Sequence[WireFault], rig: RigC
     values = [fault for fault in faults if not _spoil_line(emulator, fault)]
     if values:
         emulator.source = AlteredSource(emulator.source, values, rig)
+
+
+LINE_KINDS = (
+    "silent", "off", "lost", "streaming", "latency", "other-device", "crc", "junk", "echo", "busy", "shared",
+)  # fmt: skip
+"""What concerns an FT 300's line, or the device at its end."""
+
+
+def spoil_tool_force(emulator: UrEmulator, faults: Sequence[WireFault], rig: RigConfig) -> None:
+    """Let an arm's own sensor read what `faults` of ft say; it has no line of its own."""
+    sensor = emulator.controller.force_sensor
+    if faults and sensor.source is not None:
+        sensor.source = AlteredSource(sensor.source, faults, rig)
 
 
 def _spoil_line(emulator: Ft300Emulator, fault: WireFault) -> bool:

@@ -27,19 +27,19 @@ WIRE_KINDS: dict[str, dict[str, tuple[float, ...]]] = {
         "silent": (), "streaming": (), "latency": (16.0,), "echo": (), "other-device": (), "busy": (), "shared": (),
     },
     "arm": {
-        "silent": (), "dashboard-silent": (), "truncated": (20.0,), "version": (5.11,), "other-model": (),
+        "silent": (), "dashboard-silent": (), "truncated": (20.0,), "version": (10.07,), "other-model": (),
         "safeguard-stop": (), "brakes-on": (), "paused-program": (), "turned": (1.0,), "inputs-taken": (),
     },
     "base": {
-        "silent": (), "lag": (0.2,), "no-rosapi": (), "command-type": (), "pose-type": (), "no-listener": (),
-        "second-publisher": (), "second-client": (), "commanded": (0.1,), "clock": (5.0,), "frame": (),
-        "battery": (21.0,),
+        "silent": (), "lag": (0.2,), "no-rosapi": (), "cold": (2.0,), "slow-answers": (0.5,), "command-type": (),
+        "pose-type": (), "no-listener": (), "second-publisher": (), "second-client": (), "commanded": (0.1,),
+        "clock": (5.0,), "frame": (), "battery": (21.0,),
     },
 }  # fmt: skip
 """What only the wire has: for each kind its value where none is given; no value where it takes none."""
 
 ON_THE_WIRE: dict[str, tuple[str, ...]] = {
-    "ft": tuple(KINDS["ft"]),
+    "ft": tuple(kind for kind in KINDS["ft"] if kind != "zeroed"),
     "arm": (
         "off", "garbage", "wrong", "moving", "drifting", "protective-stop", "emergency-stop", "powered-off",
         "freedrive", "other-program", "lost",

@@ -7,6 +7,7 @@ to it with its arrival time.
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Callable
 
 from robot_io.clock import NS_PER_S, monotonic_ns, wall_offset_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
@@ -15,7 +16,7 @@ from sim_backend.ridgeback.motion_capture import MotionCapture
 from sim_backend.ridgeback.nodes import DIRECT_TOPIC, RidgebackNodes
 from sim_backend.ridgeback.ros_graph import RosGraph, Topic
 from sim_backend.ridgeback.ros_types import RosTypes
-from sim_backend.ridgeback.rosapi import RosApi
+from sim_backend.ridgeback.rosapi.services import Answer, RosApi
 from sim_backend.ridgeback.rosbridge_ops import Session
 from sim_backend.ridgeback.settings import BridgeSettings, RidgebackSettings
 from sim_backend.ridgeback.websocket_server import WebSocketPeer, WebSocketServer
@@ -58,10 +59,14 @@ class RosbridgeEmulator:
         types = RosTypes(settings.topics.ros_version, lambda: self._stamp(monotonic_ns()))
         self.graph = RosGraph(types)
         self.rosapi = RosApi(self.graph, lambda: self._stamp(monotonic_ns())) if bridge.rosapi else None
+        self.answer_delay_ns = round(bridge.answer_delay_s * NS_PER_S)
+        """How long `rosapi` takes over each answer."""
         writer = FeedWriter(
             settings.topics.ros_version, lambda t_ns: types.time(self._stamp(t_ns)), settings.base_from_marker
         )
         start_ns = monotonic_ns()
+        self.cold_until_ns = start_ns + round(bridge.cold_s * NS_PER_S)
+        """Until when `rosapi` is still starting."""
         self.nodes = RidgebackNodes(loop, self.graph, writer, source, settings, start_ns)
         self.mocap = MotionCapture(loop, self.graph, writer, source, settings, start_ns)
         self._client_count = self.graph.provide(CLIENT_COUNT_TOPIC, "std_msgs/Int32", "/rosbridge_websocket")
@@ -116,13 +121,23 @@ class RosbridgeEmulator:
         self._sessions[peer] = Session(
             self._loop,
             self.graph,
-            self.rosapi,
+            self._call_service,
             lambda text: self._send(peer, text),
             self._counters,
             escape_slashes=self._bridge.escape_slashes,
             on_new_connection=self._on_new_connection,
         )
         self._publish_client_count()
+
+    def _call_service(self, service: str, arguments: object, on_answer: Callable[[Answer], None]) -> None:
+        now_ns = monotonic_ns()
+        if self.rosapi is None or now_ns < self.cold_until_ns:
+            on_answer((False, f"Service {self.graph.resolve(service)} does not exist"))
+        elif self.answer_delay_ns:
+            answer = self.rosapi.call(service, arguments)
+            self._loop.call_at(now_ns + self.answer_delay_ns, lambda _: on_answer(answer))
+        else:
+            on_answer(self.rosapi.call(service, arguments))
 
     def _on_text(self, peer: WebSocketPeer, text: str) -> None:
         session = self._sessions.get(peer)

@@ -116,6 +116,14 @@ class BridgeFaults:
         """Run the bridge without rosapi, for clients that come later."""
         self._emulator.rosapi = None
 
+    def cold(self, seconds: float) -> None:
+        """Let rosapi be starting for so long: its services do not exist yet."""
+        self._emulator.cold_until_ns = monotonic_ns() + round(seconds * NS_PER_S)
+
+    def slow_answers(self, seconds: float) -> None:
+        """Let rosapi take so long over each answer (0 ends it)."""
+        self._emulator.answer_delay_ns = round(seconds * NS_PER_S)
+
     def set_clock(self, ahead_s: float) -> None:
         """Set the robot's clock ahead of what it is."""
         self._emulator.clock_offset_ns += round(ahead_s * NS_PER_S)

@@ -20,40 +20,42 @@ _ROS1_NAME = re.compile(r"^[A-Za-z]\w*/[A-Za-z]\w*$")
 _ROS2_NAME = re.compile(r"^([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)$")
 
 
-def _fields(text: str) -> Fields:
-    pairs = (item.split() for item in text.split(","))
+def fields_in(text: str) -> Fields:
+    """Return the (name, type) of each field in "type name, type name"."""
+    pairs = (item.split() for item in text.split(",") if item)
     return tuple((name, kind) for kind, name in pairs)
 
 
-_XYZ = _fields("float64 x, float64 y, float64 z")
+_XYZ = fields_in("float64 x, float64 y, float64 z")
 
 DEFINITIONS: dict[str, Fields] = {
+    "std_msgs/Header": (),  # its fields depend on the ROS version
     "std_msgs/Empty": (),
-    "std_msgs/Bool": _fields("bool data"),
-    "std_msgs/Int32": _fields("int32 data"),
-    "std_msgs/Float64": _fields("float64 data"),
-    "std_msgs/String": _fields("string data"),
+    "std_msgs/Bool": fields_in("bool data"),
+    "std_msgs/Int32": fields_in("int32 data"),
+    "std_msgs/Float64": fields_in("float64 data"),
+    "std_msgs/String": fields_in("string data"),
     "geometry_msgs/Vector3": _XYZ,
     "geometry_msgs/Point": _XYZ,
-    "geometry_msgs/Quaternion": _fields("float64 x, float64 y, float64 z, float64 w"),
-    "geometry_msgs/Twist": _fields("geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular"),
-    "geometry_msgs/TwistStamped": _fields("std_msgs/Header header, geometry_msgs/Twist twist"),
-    "geometry_msgs/Pose": _fields("geometry_msgs/Point position, geometry_msgs/Quaternion orientation"),
-    "geometry_msgs/PoseStamped": _fields("std_msgs/Header header, geometry_msgs/Pose pose"),
-    "geometry_msgs/PoseWithCovariance": _fields("geometry_msgs/Pose pose, float64[36] covariance"),
-    "geometry_msgs/TwistWithCovariance": _fields("geometry_msgs/Twist twist, float64[36] covariance"),
-    "geometry_msgs/Transform": _fields("geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation"),
-    "geometry_msgs/TransformStamped": _fields(
+    "geometry_msgs/Quaternion": fields_in("float64 x, float64 y, float64 z, float64 w"),
+    "geometry_msgs/Twist": fields_in("geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular"),
+    "geometry_msgs/TwistStamped": fields_in("std_msgs/Header header, geometry_msgs/Twist twist"),
+    "geometry_msgs/Pose": fields_in("geometry_msgs/Point position, geometry_msgs/Quaternion orientation"),
+    "geometry_msgs/PoseStamped": fields_in("std_msgs/Header header, geometry_msgs/Pose pose"),
+    "geometry_msgs/PoseWithCovariance": fields_in("geometry_msgs/Pose pose, float64[36] covariance"),
+    "geometry_msgs/TwistWithCovariance": fields_in("geometry_msgs/Twist twist, float64[36] covariance"),
+    "geometry_msgs/Transform": fields_in("geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation"),
+    "geometry_msgs/TransformStamped": fields_in(
         "std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform"
     ),
-    "nav_msgs/Odometry": _fields(
+    "nav_msgs/Odometry": fields_in(
         "std_msgs/Header header, string child_frame_id, geometry_msgs/PoseWithCovariance pose, "
         "geometry_msgs/TwistWithCovariance twist"
     ),
-    "sensor_msgs/JointState": _fields(
+    "sensor_msgs/JointState": fields_in(
         "std_msgs/Header header, string[] name, float64[] position, float64[] velocity, float64[] effort"
     ),
-    "ridgeback_msgs/Status": _fields(
+    "ridgeback_msgs/Status": fields_in(
         "std_msgs/Header header, string hardware_id, duration mcu_uptime, duration connection_uptime, "
         "float32 pcb_temperature, float32 mcu_temperature, bool stop_power_status, bool stop_engaged, "
         "bool drivers_active, bool external_stop_present, bool charger_connected, bool charging_complete, "
@@ -72,6 +74,7 @@ class RosTypes:
     """Type names and message checks of one ROS version (1 or 2). `now` gives the robot's time (s, ns)."""
 
     def __init__(self, ros_version: int, now: Callable[[], RosTime]) -> None:
+        self.ros_version = ros_version
         self._ros2 = ros_version == 2
         self._now = now
 
@@ -100,7 +103,7 @@ class RosTypes:
         kind = type_name.replace("/msg/", "/")
         kinds, texts = [kind], list[str]()
         for nested in kinds:  # grows while it is iterated
-            fields = self._fields_of(nested)
+            fields = self.fields_of(nested)
             texts.append("".join(f"{field} {name}\n" for name, field in fields))
             kinds += dict.fromkeys(field for _, field in fields if "/" in field and field not in kinds)
         return f"\n{'=' * 80}\n".join(
@@ -152,7 +155,7 @@ class RosTypes:
     def _object(self, kind: str, value: object, path: str) -> dict[str, Any]:
         if not isinstance(value, dict):
             raise BadMessage(f"{path} needs an object")
-        fields = self._fields_of(kind)
+        fields = self.fields_of(kind)
         unknown = value.keys() - {name for name, _ in fields}
         if unknown:
             raise BadMessage(f"{path} has no field {sorted(map(str, unknown))[0]}")
@@ -164,7 +167,8 @@ class RosTypes:
             filled["stamp"] = self.time(self._now())
         return filled
 
-    def _fields_of(self, kind: str) -> Fields:
+    def fields_of(self, kind: str) -> Fields:
+        """Return the fields of a message type in its short spelling (`pkg/Type`)."""
         if kind == "std_msgs/Header":
             both = (("stamp", "time"), ("frame_id", "string"))
             return both if self._ros2 else (("seq", "uint32"), *both)
@@ -182,7 +186,7 @@ class RosTypes:
         if kind.endswith("]"):
             element, _, length = kind[:-1].partition("[")
             return [self._default(element) for _ in range(int(length or 0))]
-        filled = {name: self._default(field) for name, field in self._fields_of(kind)}
+        filled = {name: self._default(field) for name, field in self.fields_of(kind)}
         if kind == "std_msgs/Header" and not self._ros2:
             filled["stamp"] = self.time(self._now())
         return filled

@@ -5,22 +5,23 @@ JSON first, else the first object in it that parses; an object without `op` foun
 its text stays in the buffer, so that a truncated message breaks the connection permanently. JSON that breaks the
 server's own code (a bare number or boolean, an `op` that cannot be looked up) ends the thread that serves this
 client: what it sends later is never read, while its subscriptions continue.
-Not modelled: png and cbor compression (plain JSON is sent), outgoing fragments, authentication.
+Not modelled: png and cbor compression (plain JSON is sent), outgoing fragments, authentication, services of clients.
 Source: rosbridge protocol document, and the behaviour of rosbridge_suite 0.11.17.
 """
 
 from __future__ import annotations
 
 import json
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from robot_io.clock import NS_PER_MS, NS_PER_S, monotonic_ns
-from robot_io.ipc.event_loop import EventLoop, Timer
+from robot_io.clock import NS_PER_S, monotonic_ns
+from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ridgeback.ros_graph import Message, RosGraph, Topic, message_json
 from sim_backend.ridgeback.ros_types import BadMessage
-from sim_backend.ridgeback.rosapi import RosApi
+from sim_backend.ridgeback.rosapi.services import Answer
+from sim_backend.ridgeback.subscription import ClientSubscription
 
 UNREGISTER_NS = 10 * NS_PER_S
 """A disconnected client still counts as publisher for this long."""
@@ -31,71 +32,6 @@ class _Wrong(Exception):
     """A request that the server drops; the text would go to the robot's log."""
 
 
-class ClientSubscription:
-    """A client's subscription to a topic: spacing in ms, and how many messages may be queued.
-
-    Several subscribe requests of one client form one subscription with the smallest spacing and queue length of all.
-    """
-
-    def __init__(self, loop: EventLoop, send: Callable[[str], None], head: str) -> None:
-        self._loop = loop
-        self._send = send
-        self._head = head
-        self._requests: dict[object, tuple[int, int]] = {}
-        self._spacing_ns = 0
-        self._waiting: deque[str] = deque()
-        self._queue_length = 0
-        self._last_ns = 0
-        self._timer: Timer | None = None
-
-    def add(self, request_id: object, throttle_ms: int, queue_length: int) -> None:
-        """Add or replace one request."""
-        self._requests[request_id] = (throttle_ms, queue_length)
-        self._merge()
-
-    def remove(self, request_id: object) -> bool:
-        """Remove one request (None: all); return whether none is left."""
-        if request_id is None:
-            self._requests.clear()
-        self._requests.pop(request_id, None)
-        self._merge()
-        return not self._requests
-
-    def deliver(self, message_json: str) -> None:
-        """Send a message, queue it until it is due, or drop it."""
-        now_ns = monotonic_ns()
-        due_ns = self._last_ns + self._spacing_ns
-        if now_ns >= due_ns and not self._waiting:
-            self._send_now(message_json, now_ns)
-        elif self._queue_length > 0:
-            if len(self._waiting) >= self._queue_length:
-                self._waiting.popleft()
-            self._waiting.append(message_json)
-            if self._timer is None:
-                self._timer = self._loop.call_at(due_ns, self._send_waiting)
-
-    def close(self) -> None:
-        """Stop sending."""
-        self._waiting.clear()
-        if self._timer is not None:
-            self._timer.cancel()
-
-    def _merge(self) -> None:
-        self._spacing_ns = min((throttle for throttle, _ in self._requests.values()), default=0) * NS_PER_MS
-        self._queue_length = min((length for _, length in self._requests.values()), default=0)
-
-    def _send_now(self, message_json: str, now_ns: int) -> None:
-        self._last_ns = now_ns
-        self._send(f"{self._head}{message_json}}}")
-
-    def _send_waiting(self, _: int) -> None:
-        self._timer = None
-        if self._waiting:
-            self._send_now(self._waiting.popleft(), monotonic_ns())
-        if self._waiting:
-            self._timer = self._loop.call_at(self._last_ns + self._spacing_ns, self._send_waiting)
-
-
 class Session:
     """One connected client. `incoming` receives its texts; `send` sends it ours."""
 
@@ -103,7 +39,7 @@ class Session:
         self,
         loop: EventLoop,
         graph: RosGraph,
-        rosapi: RosApi | None,
+        call_service: Callable[[str, object, Callable[[Answer], None]], None],
         send: Callable[[str], None],
         counters: Counter[str],
         *,
@@ -112,7 +48,7 @@ class Session:
     ) -> None:
         self._loop = loop
         self._graph = graph
-        self._rosapi = rosapi
+        self._ask_service = call_service
         self._raw_send = send
         self._counters = counters
         self._escape = escape_slashes
@@ -131,6 +67,8 @@ class Session:
             "call_service": self._call_service,
             "fragment": self._fragment,
         }
+        if graph.types.ros_version == 2:
+            self._operations["send_action_goal"] = self._send_action_goal
 
     def incoming(self, text: str) -> None:
         """Process one text frame."""
@@ -238,14 +176,23 @@ class Session:
         service = _text(request, "service")
         _check_options(request, {"compression": str, "fragment_size": (int, type(None))})
         name, _, old_id = service.partition("#")  # an old notation of the id
-        if self._rosapi is None:
-            ok, values = False, f"Service {self._graph.resolve(name)} does not exist"
-        else:
-            ok, values = self._rosapi.call(name, request.get("args", []))
-        answer = {"op": "service_response", "service": service, "values": values, "result": ok}
         call_id = request.get("id")
-        if call_id is not None or old_id:
-            answer["id"] = old_id if call_id is None else call_id
+
+        def on_answer(answer: Answer) -> None:
+            ok, values = answer
+            response = {"op": "service_response", "service": service, "values": values, "result": ok}
+            if call_id is not None or old_id:
+                response["id"] = old_id if call_id is None else call_id
+            self._send(json.dumps(response, separators=(",", ":")))
+
+        self._ask_service(name, request.get("args", []), on_answer)
+
+    def _send_action_goal(self, request: Message) -> None:
+        action, _, old_id = _text(request, "action").partition("#")
+        answer = {"op": "action_result", "action": request["action"], "status": 0, "result": False}
+        answer["values"] = f"{_text(request, 'action_type')}: the emulated robot has no action server {action}"
+        if request.get("id") is not None or old_id:
+            answer["id"] = request.get("id", old_id)
         self._send(json.dumps(answer, separators=(",", ":")))
 
     def _fragment(self, request: Message) -> None:

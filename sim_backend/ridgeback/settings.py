@@ -84,6 +84,10 @@ class BridgeSettings(msgspec.Struct, frozen=True):
     """Leave the kernel's Nagle algorithm on, as the server does with newer versions of autobahn."""
     rosapi: bool = True
     """Whether the rosapi node runs."""
+    cold_s: float = 0.0
+    """For how long from the start it is still starting: its services do not exist yet."""
+    answer_delay_s: float = 0.0
+    """How long it takes over each answer."""
     ping_interval_s: float = 0.0
     ping_timeout_s: float = 0.0
     clock_skew_s: float = 0.0

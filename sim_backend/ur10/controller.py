@@ -1,4 +1,4 @@
-"""The emulated controller (CB3): power, safety, program, registers and joints, one 8 ms cycle at a time.
+"""The emulated controller: power, safety, program, registers and joints, one control cycle at a time (8 ms or 2 ms).
 
 It has no sockets. Simplified: power steps take a fixed time; a protective stop pauses the running program and
 unlocking leaves it paused; an emergency stop ends the program and switches the power off.
@@ -10,34 +10,44 @@ import math
 
 from robot_io.clock import NS_PER_MS, NS_PER_S
 from robot_io.messages import Joints
-from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode
+from sim_backend.ur10.force_sensor import ForceSensor
+from sim_backend.ur10.models import UrModel
+from sim_backend.ur10.modes import MAY_MOVE, RobotMode, RuntimeState, SafetyMode, SafetyStatus
 from sim_backend.ur10.motion import ArmMotion
-from sim_backend.ur10.program import CYCLE_S, OtherProgram, Program, program_of
+from sim_backend.ur10.program import OtherProgram, Program, program_of
 from sim_backend.ur10.registers import Registers, Watchdog
-from sim_backend.world.plant import ArmSource
+from sim_backend.world.plant import ArmSource, FtSource
 
 PROGRAM_START_NS = 50 * NS_PER_MS
 UNLOCK_AFTER_NS = 5 * NS_PER_S
 START_TIME_S = 1000.0
 """The controller's own clock when the emulator starts."""
 
-Version = tuple[int, int, int, int]
-
 
 class UrController:
     """State of one robot; `cycle` advances it, everything else changes it at once."""
 
-    def __init__(self, source: ArmSource, version: Version, now_ns: int, power_step_s: float = 1.0) -> None:
-        self.version = version
+    def __init__(
+        self,
+        source: ArmSource,
+        model: UrModel,
+        now_ns: int,
+        power_step_s: float = 1.0,
+        wrench: FtSource | None = None,
+    ) -> None:
+        self.model = model
+        self.version = model.version
         self.registers = Registers()
-        self.motion = ArmMotion()
+        self.motion = ArmMotion(model.range_rad)
         self.watchdog: Watchdog | None = None
         self.payload_kg = 0.0
         self.payload_cog_m = (0.0, 0.0, 0.0)
         self.tcp_offset: Joints = (0.0,) * 6
         self.external_wrench: Joints = (0.0,) * 6
+        self.force_sensor = ForceSensor(wrench)
         self.robot_mode = RobotMode.RUNNING
         self.safety_mode = SafetyMode.NORMAL
+        self.safeguard = SafetyStatus.SAFEGUARD_STOP
         self.runtime_state = RuntimeState.STOPPED
         self.teach_button = False
         self.program: Program | None = None
@@ -51,12 +61,33 @@ class UrController:
         self._stopped_ns = 0
         self._waiting: tuple[int, Program] | None = None
         self._power_at: tuple[int, RobotMode] | None = None
-        self.motion.step(source.read_arm(now_ns), CYCLE_S)
+        self.motion.step(source.read_arm(now_ns), model.cycle_s)
 
     @property
     def time_s(self) -> float:
-        """The controller's own clock, s: it advances by exactly 8 ms per cycle."""
-        return START_TIME_S + self.counters["cycles"] * CYCLE_S + self.time_jump_s
+        """The controller's own clock, s: it advances by exactly one cycle time per cycle."""
+        return START_TIME_S + self.counters["cycles"] * self.model.cycle_s + self.time_jump_s
+
+    @property
+    def safety_status(self) -> SafetyStatus:
+        """The safety mode as an e-Series says it, which tells safeguard stops apart."""
+        return self.safeguard if self.safety_mode == SafetyMode.SAFEGUARD_STOP else SafetyStatus(self.safety_mode)
+
+    @property
+    def raw_wrench(self) -> Joints:
+        """What the sensor at the flange reads, in its axes: N, N*m. Zeros without one."""
+        return self.force_sensor.raw(self._now_ns)
+
+    @property
+    def tcp_force(self) -> Joints:
+        """Wrench on the tool in the axes of the arm's base: N, N*m. Of the sensor, or as a client feeds it in."""
+        if not self.force_sensor.fitted:
+            return self.external_wrench
+        return self.force_sensor.compensated(self._now_ns, self.motion.actual, self.payload_kg, self.payload_cog_m)
+
+    def zero_force_sensor(self) -> None:
+        """Make the force on the tool zero as it is now, as `zero_ftsensor()` does. The raw wrench stays."""
+        self.force_sensor.zero(self._now_ns, self.motion.actual, self.payload_kg, self.payload_cog_m)
 
     @property
     def reported_q(self) -> Joints:
@@ -81,7 +112,7 @@ class UrController:
         playing = self.runtime_state == RuntimeState.PLAYING
         if playing and self.program is not None and not self.program.step(self, now_ns):
             self.stop_program()
-        self.motion.step(self._source.read_arm(now_ns), CYCLE_S)
+        self.motion.step(self._source.read_arm(now_ns), self.model.cycle_s)
 
     def upload(self, text: str) -> None:
         """Accept a program from a script port; it replaces a running one. Ignored silently when not ready."""
@@ -155,8 +186,9 @@ class UrController:
         self.safety_mode = SafetyMode.PROTECTIVE_STOP
         self._stopped_ns = self._now_ns
 
-    def trip_safeguard_stop(self) -> None:
-        """Stop as for an opened safety fence; the program is paused."""
+    def trip_safeguard_stop(self, status: SafetyStatus = SafetyStatus.SAFEGUARD_STOP) -> None:
+        """Stop as for an opened safety fence; the program is paused. An e-Series tells which safeguard it was."""
+        self.safeguard = status
         self.pause_program()
         self.safety_mode = SafetyMode.SAFEGUARD_STOP
 

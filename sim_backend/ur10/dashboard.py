@@ -1,6 +1,6 @@
 """The dashboard server of the emulated controller (port 29999): one command and one reply per line.
 
-Source: Universal Robots dashboard server manual, CB3.
+Source: Universal Robots dashboard server manual, CB3 and e-Series.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _LINE_LIMIT_BYTES = 10_000
 class Dashboard:
     """Answers dashboard commands for one robot."""
 
-    def __init__(self, robot: UrController, model: str, serial: str, programs: tuple[str, ...]) -> None:
-        self.model = model
+    def __init__(self, robot: UrController, programs: tuple[str, ...]) -> None:
+        self.model = robot.model.dashboard_name
         self._robot = robot
-        self._serial = serial
+        self._serial = robot.model.serial
         self._programs = programs
         self._loaded = ""
         self._role = "NONE"
@@ -36,7 +36,7 @@ class Dashboard:
             "polyscopeversion": self._version,
             "robotmode": lambda: f"Robotmode: {robot.robot_mode.name}",
             "safetymode": lambda: f"Safetymode: {robot.safety_mode.name}",
-            "safetystatus": lambda: f"Safetystatus: {robot.safety_mode.name}",
+            "safetystatus": lambda: f"Safetystatus: {robot.safety_status.name}",
             "running": lambda: f"Program running: {str(robot.runtime_state == RuntimeState.PLAYING).lower()}",
             "programstate": self._program_state,
             "stop": self._stop,
@@ -78,7 +78,8 @@ class Dashboard:
         return f"could not understand: '{line}'"
 
     def _version(self) -> str:
-        return "URSoftware {}.{}.{}.{} (Oct 05 2021)".format(*self._robot.version)
+        version = ".".join(map(str, self._robot.version))
+        return f"URSoftware {version} ({self._robot.model.version_date})"
 
     def _program_state(self) -> str:
         state = "PAUSED" if self._robot.runtime_state == RuntimeState.PAUSED else "STOPPED"

@@ -1,31 +1,35 @@
-"""A UR10 controller (CB3, PolyScope 3.15) on the wire: RTDE, script upload and dashboard on one loopback address.
+"""A UR controller on the wire (CB3 with PolyScope 3.15, e-Series with 5.12), on one loopback address.
 
-One thread, one event loop, shared with whatever else runs in it. The joints come from the world; motion by a program
-or a fault is added to them (`motion`) and does not feed back into the world.
+It serves RTDE, script upload and dashboard. One thread, one event loop, shared with whatever else runs in it. Joints
+come from the world; motion by a program or a fault is added to them (`motion`) and does not feed back into the world.
 """
 
 from __future__ import annotations
 
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
-from sim_backend.ur10.controller import UrController, Version
+from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import Dashboard, DashboardServer
 from sim_backend.ur10.faults import UrFaults
+from sim_backend.ur10.models import UR10, UrModel, Version
 from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.script_server import script_servers
 from sim_backend.ur10.tcp import TcpServer
-from sim_backend.world.plant import ArmSource
+from sim_backend.world.plant import ArmSource, FtSource
 
-CB3_VERSION: Version = (3, 15, 8, 106339)
+REAL_CLOCK = 0.99992
+"""What an outside clock makes of a controller's rate."""
 RESYNC_AFTER_NS = NS_PER_S
 
 
 class UrEmulator(UrFaults):
-    """An emulated UR10 at `host` (127.x.y.z), serving as soon as its loop runs.
+    """An emulated UR arm at `host` (127.x.y.z), serving as soon as its loop runs.
 
-    `rate_hz` is the control cycle measured by an outside clock (a real one is never exactly 125 Hz); `phase`
-    (0..1) shifts its grid. The fault methods are those of `UrFaults`; `requests` and `counters` record what happened.
+    `rate_hz` is the control cycle measured by an outside clock (a real one is never exactly 125 or 500 Hz; None: as
+    one is); `phase` (0..1) shifts its grid; `version` is another PolyScope than the model's;
+    `wrench` feeds the sensor at the flange, which only an e-Series arm has. The fault methods are
+    those of `UrFaults`; `requests` and `counters` record what happened.
     Raises EnvironmentFault when a port is taken, UsageError for an address that is not loopback.
     """
 
@@ -35,19 +39,20 @@ class UrEmulator(UrFaults):
         source: ArmSource,
         *,
         host: str = "127.0.0.10",
-        rate_hz: float = 124.99,
+        model: UrModel = UR10,
+        rate_hz: float | None = None,
         phase: float = 0.21,
-        version: Version = CB3_VERSION,
-        model: str = "UR10",
-        serial: str = "2015301234",
+        version: Version | None = None,
         programs: tuple[str, ...] = ("/programs/other.urp",),
         power_step_s: float = 1.0,
+        wrench: FtSource | None = None,
     ) -> None:
         self.host = host
         self.requests = RequestLog()
-        self.controller = UrController(source, version, monotonic_ns(), power_step_s)
+        self.controller = UrController(source, model, monotonic_ns(), power_step_s, wrench)
+        self.controller.version = version or model.version
         self._loop = loop
-        self._period_ns = NS_PER_S / rate_hz
+        self._period_ns = NS_PER_S / (rate_hz or model.rate_hz * REAL_CLOCK)
         self._start_ns = monotonic_ns() + round(phase * self._period_ns)
         self._cycle = 0
         self._timer: Timer | None = None
@@ -57,9 +62,7 @@ class UrEmulator(UrFaults):
         try:
             self.rtde = RtdeServer(loop, host, self.controller, self.requests)
             opened.append(self.rtde)
-            self.dashboard = DashboardServer(
-                loop, host, Dashboard(self.controller, model, serial, programs), self.requests
-            )
+            self.dashboard = DashboardServer(loop, host, Dashboard(self.controller, programs), self.requests)
             opened.append(self.dashboard)
             self.scripts = script_servers(loop, host, self.controller, self.requests)
         except BaseException:

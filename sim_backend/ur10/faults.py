@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.dashboard import DashboardServer
-from sim_backend.ur10.modes import RobotMode, SafetyMode
+from sim_backend.ur10.modes import RobotMode, SafetyMode, SafetyStatus
 from sim_backend.ur10.registers import REGISTERS
 from sim_backend.ur10.rtde_server import RtdeServer
 from sim_backend.ur10.tcp import TcpServer
@@ -37,6 +37,23 @@ class UrFaults:
     def safeguard_stop(self) -> None:
         """Stop as for an opened safety fence; a program is paused."""
         self.controller.trip_safeguard_stop()
+
+    def enabling_stop(self) -> None:
+        """Stop as by a three-position enabling switch let go (e-Series); a program is paused."""
+        self.controller.trip_safeguard_stop(SafetyStatus.SYSTEM_THREE_POSITION_ENABLING_STOP)
+
+    def zero_force(self) -> None:
+        """Zero the force on the tool from the pendant."""
+        self.controller.zero_force_sensor()
+
+    def jump_force(self, wrench: Sequence[float]) -> None:
+        """Let the sensor at the flange read this much more in each axis (N, N*m), at once and for good."""
+        fx, fy, fz, mx, my, mz = wrench
+        self.controller.force_sensor.jump = (fx, fy, fz, mx, my, mz)
+
+    def break_force(self) -> None:
+        """Let the sensor at the flange read NaN."""
+        self.controller.force_sensor.broken = True
 
     def emergency_stop(self) -> None:
         """Stop as by the red button: power off."""

@@ -1,4 +1,4 @@
-"""The RTDE variables of a CB3 controller: name, type on the wire, and how the emulator reads or writes the value.
+"""The RTDE variables of a UR controller: name, type on the wire, and how the emulator reads or writes the value.
 
 Source: Universal Robots RTDE guide. Clients decode by their own table, so the types must be the documented ones.
 Quantities that are not modelled are constants of a healthy robot at rest.
@@ -12,6 +12,7 @@ import msgspec
 
 from sim_backend.ur10.controller import UrController
 from sim_backend.ur10.kinematics import flange_pose
+from sim_backend.ur10.models import Version
 from sim_backend.ur10.modes import RobotMode, joint_mode, robot_status_bits, safety_bits
 from sim_backend.ur10.registers import REGISTERS
 
@@ -47,9 +48,9 @@ class Input(msgspec.Struct, frozen=True):
     write: Callable[[UrController, Values, int], None]
 
 
-def output_field(name: str) -> Output | None:
-    """Return the output called `name`, or None (NOT_FOUND)."""
-    return _OUTPUTS.get(name)
+def output_field(name: str, version: Version) -> Output | None:
+    """Return the output called `name` in a version of PolyScope, or None (NOT_FOUND)."""
+    return _OUTPUTS.get(name) if version >= _SINCE.get(name, version) else None
 
 
 def input_field(name: str) -> Input | None:
@@ -66,11 +67,11 @@ def _zeros(type_name: str) -> Output:
 
 
 def _wrench(robot: UrController) -> Values:
-    return robot.external_wrench
+    return robot.tcp_force
 
 
 def _pose(robot: UrController) -> Values:
-    return flange_pose(robot.motion.actual)
+    return flange_pose(robot.motion.actual, robot.model)
 
 
 def _joint_modes(robot: UrController) -> Values:
@@ -107,7 +108,7 @@ _OUTPUTS: dict[str, Output] = {
     "robot_mode": Output("INT32", lambda r: (int(r.robot_mode),)),
     "joint_mode": Output("VECTOR6INT32", _joint_modes),
     "safety_mode": Output("INT32", lambda r: (int(r.safety_mode),)),
-    "safety_status": Output("INT32", lambda r: (int(r.safety_mode),)),
+    "safety_status": Output("INT32", lambda r: (int(r.safety_status),)),
     "actual_tool_accelerometer": _constant("VECTOR3D", 0.0, -9.8, 0.0),
     "speed_scaling": _constant("DOUBLE", 1.0),
     "target_speed_fraction": _constant("DOUBLE", 1.0),
@@ -139,7 +140,8 @@ _OUTPUTS: dict[str, Output] = {
     "tool_output_voltage": _constant("INT32", 0),
     "tool_output_current": _constant("DOUBLE", 0.0),
     "tool_temperature": _constant("DOUBLE", 36.0),
-    "tcp_force_scalar": Output("DOUBLE", lambda r: (sum(f * f for f in r.external_wrench[:3]) ** 0.5,)),
+    "tcp_force_scalar": Output("DOUBLE", lambda r: (sum(f * f for f in r.tcp_force[:3]) ** 0.5,)),
+    "ft_raw_wrench": Output("VECTOR6D", lambda r: r.raw_wrench),
     "tcp_offset": Output("VECTOR6D", lambda r: r.tcp_offset),
     "payload": Output("DOUBLE", lambda r: (r.payload_kg,)),
     "payload_cog": Output("VECTOR3D", lambda r: r.payload_cog_m),
@@ -147,6 +149,9 @@ _OUTPUTS: dict[str, Output] = {
     "output_bit_registers0_to_31": _constant("UINT32", 0),
     "output_bit_registers32_to_63": _constant("UINT32", 0),
 }
+
+_SINCE: dict[str, Version] = {"ft_raw_wrench": (5, 9, 0, 0)}
+"""From which version on there is an output that older ones do not have."""
 
 
 def _discard(_robot: UrController, _values: Values, _now_ns: int) -> None:

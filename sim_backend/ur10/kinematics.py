@@ -1,18 +1,19 @@
-"""Pose of a UR10's flange as its controller reports it: a place and a rotation vector."""
+"""Pose of a UR arm's flange as its controller reports it: a place and a rotation vector."""
 
 from __future__ import annotations
 
 import math
 
 from robot_io.messages import Joints
+from sim_backend.ur10.models import UrModel
 from sim_backend.world.arm_geometry import flange
 
 Pose6 = tuple[float, float, float, float, float, float]
 
 
-def flange_pose(q: Joints) -> Pose6:
+def flange_pose(q: Joints, model: UrModel) -> Pose6:
     """Return x, y, z (m) and rotation vector (rad) of the flange in the arm's base frame, from `q` (rad)."""
-    rotation, (x, y, z) = flange(q)
+    rotation, (x, y, z) = flange(q, model.d_m, model.a_m)
     return (x, y, z, *rotation_vector(rotation))
 
 

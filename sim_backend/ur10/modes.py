@@ -1,6 +1,6 @@
-"""Numbers of a UR controller (CB3): robot, safety, runtime and joint modes and the bits derived from them.
+"""Numbers of a UR controller: robot, safety, runtime and joint modes and the bits derived from them.
 
-Source: Universal Robots RTDE guide and client interface manual.
+Source: Universal Robots RTDE guide and client interface manual, CB3 and e-Series. The bits are those of both.
 """
 
 from __future__ import annotations
@@ -34,6 +34,22 @@ class SafetyMode(IntEnum):
     ROBOT_EMERGENCY_STOP = 7
     VIOLATION = 8
     FAULT = 9
+
+
+class SafetyStatus(IntEnum):
+    """Output `safety_status` (e-Series): the safety mode, or which safeguard stop it is."""
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+    AUTOMATIC_MODE_SAFEGUARD_STOP = 12
+    SYSTEM_THREE_POSITION_ENABLING_STOP = 13
 
 
 class RuntimeState(IntEnum):

@@ -14,14 +14,16 @@ from sim_backend.world.plant import ArmTruth
 
 SERVO_LAG_S = 0.03
 STEADY_RAD_PER_S = 0.001
-JOINT_RANGE_RAD = 2.0 * math.pi
-"""In either direction, as on the real arm."""
 
 
 class ArmMotion:
-    """Joint angles (rad) after each controller cycle; `offset` is the arm's deviation from the world's joints."""
+    """Joint angles (rad) after each controller cycle; `offset` is the arm's deviation from the world's joints.
 
-    def __init__(self) -> None:
+    range_rad: how far each joint turns either way.
+    """
+
+    def __init__(self, range_rad: Joints) -> None:
+        self._range_rad = range_rad
         self.offset = [0.0] * 6
         self.drift_rate = [0.0] * 6
         """Drift of each joint (rad/s), for fault injection."""
@@ -44,7 +46,7 @@ class ArmMotion:
 
     def servo(self, target: Joints) -> None:
         """Follow `target` until the next command."""
-        target = _joints([_in_range(q) for q in target])
+        target = self._within_range(target)
 
         def follow(base: Joints, dt_s: float) -> Sequence[float]:
             share = 1.0 - math.exp(-dt_s / SERVO_LAG_S)
@@ -60,7 +62,7 @@ class ArmMotion:
 
     def move(self, target: Joints, speed_rad_per_s: float) -> None:
         """Go to `target` with the leading joint at `speed_rad_per_s`; `moving` until arrived."""
-        target = _joints([_in_range(q) for q in target])
+        target = self._within_range(target)
 
         def straight(base: Joints, dt_s: float) -> Sequence[float]:
             left = [target[i] - base[i] - self.offset[i] for i in range(6)]
@@ -81,17 +83,22 @@ class ArmMotion:
         for i in range(6):
             change = commanded[i] + self.drift_rate[i] * dt_s
             wanted = base.position[i] + self.offset[i] + change
-            if (reached := _in_range(wanted)) != wanted:
+            if (reached := _in_range(wanted, self._range_rad[i])) != wanted:
                 change = reached - base.position[i] - self.offset[i]
             self.offset[i] += change
             rates.append(base.velocity[i] + change / dt_s)
         self.velocity = _joints(rates)
         self.actual = self.target = _joints([base.position[i] + self.offset[i] for i in range(6)])
 
+    def _within_range(self, target: Joints) -> Joints:
+        return _joints([_in_range(q, limit) for q, limit in zip(target, self._range_rad, strict=True)])
 
-def _in_range(q: float) -> float:
+
+def _in_range(q: float, limit: float) -> float:
     """Return `q` (rad), or the end of the joint's range when it lies beyond; clients command infinity and NaN too."""
-    return q if abs(q) <= JOINT_RANGE_RAD else math.copysign(JOINT_RANGE_RAD, q)
+    if math.isfinite(q) and abs(q) <= limit:
+        return q
+    return math.copysign(min(limit, 2.0 * math.pi), q)
 
 
 def _joints(values: Sequence[float]) -> Joints:

@@ -13,6 +13,7 @@ from typing import Protocol
 
 from robot_io.messages import Joints
 from sim_backend.ur10.kinematics import flange_pose
+from sim_backend.ur10.models import UrModel
 from sim_backend.ur10.motion import ArmMotion
 from sim_backend.ur10.registers import Registers, Watchdog
 
@@ -44,12 +45,11 @@ STOP_SCRIPT = 255
 REALTIME = frozenset({6, SPEED_J, 10, SERVO_J, 24, 25, GET_STEP_TIME, GET_JOINT_HISTORY, 38, 58, *range(66, 72)})
 """Commands executed every cycle while they are in the register; all others once, until the register is 0."""
 
-CYCLE_S = 0.008
-
 
 class Robot(Protocol):
     """The part of the controller that a program can access."""
 
+    model: UrModel
     registers: Registers
     motion: ArmMotion
     watchdog: Watchdog | None
@@ -124,7 +124,7 @@ class ControlScript:
         elif command == SPEED_J:
             robot.motion.speed(self._joints(robot))
         elif command == GET_STEP_TIME:
-            self._answer(robot, (CYCLE_S,))
+            self._answer(robot, (robot.model.cycle_s,))
         elif command == GET_JOINT_HISTORY:
             self._answer(robot, robot.motion.actual)
 
@@ -154,7 +154,7 @@ class ControlScript:
         elif command == GET_TCP_OFFSET:
             self._answer(robot, robot.tcp_offset)
         elif command == FORWARD_KINEMATICS:
-            self._answer(robot, flange_pose(robot.motion.actual))
+            self._answer(robot, flange_pose(robot.motion.actual, robot.model))
         elif command == IS_STEADY:
             robot.registers.int_out[self.offset + 1] = int(robot.motion.steady)
         elif command in (POSE_WITHIN_LIMITS, JOINTS_WITHIN_LIMITS):

@@ -17,7 +17,6 @@ from sim_backend.ur10.request_log import RequestLog
 from sim_backend.ur10.tcp import TcpClient, TcpServer
 
 RTDE_PORT = 30004
-CYCLE_HZ = 125.0
 DROP_ABOVE_BYTES = 20_000
 """Data frames for a client that leaves more than this unread are dropped."""
 
@@ -67,7 +66,7 @@ class RtdeClient(TcpClient):
         self.started = False
         self.output: OutputRecipe | None = None
         self.inputs: list[InputRecipe] = []
-        self.frequency_hz = CYCLE_HZ
+        self.frequency_hz = server.robot.model.rate_hz
         self.skip_frames = 0
         self.cut_frame_to: int | None = None
         self._due = 0.0
@@ -108,7 +107,7 @@ class RtdeClient(TcpClient):
         """Send one data frame if this client's rate requires one in this cycle."""
         if not self.started or self.output is None:
             return
-        self._due += self.frequency_hz / CYCLE_HZ
+        self._due += self.frequency_hz / self.rtde.robot.model.rate_hz
         if self._due < 1.0 - 1e-9:
             return
         self._due -= 1.0
@@ -154,7 +153,7 @@ class RtdeClient(TcpClient):
         self.reply("v", struct.pack(">4I", *self.rtde.robot.version))
 
     def _on_outputs(self, body: bytes) -> None:
-        frequency_hz = CYCLE_HZ
+        most_hz = frequency_hz = self.rtde.robot.model.rate_hz
         if self.version == 2:
             if len(body) < 8:
                 self.rtde.requests.bad_frames += 1
@@ -162,14 +161,14 @@ class RtdeClient(TcpClient):
             (frequency_hz,) = struct.unpack_from(">d", body)
             body = body[8:]
         names = _names(body)
-        fields = [output_field(name) for name in names]
+        fields = [output_field(name, self.rtde.robot.version) for name in names]
         types = ",".join("NOT_FOUND" if field is None else field.type for field in fields)
         found = [field for field in fields if field is not None]
         complete = bool(names) and len(found) == len(names)
         if complete:
             self.output = OutputRecipe(found)
-            self.frequency_hz = min(max(frequency_hz, 1.0), CYCLE_HZ) if math.isfinite(frequency_hz) else CYCLE_HZ
-            self._due = 1.0 - self.frequency_hz / CYCLE_HZ  # the first frame is sent in the first cycle
+            self.frequency_hz = min(max(frequency_hz, 1.0), most_hz) if math.isfinite(frequency_hz) else most_hz
+            self._due = 1.0 - self.frequency_hz / most_hz  # the first frame is sent in the first cycle
         self.reply("O", (bytes([complete]) if self.version == 2 else b"") + types.encode())
 
     def _on_inputs(self, body: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Flange of a UR10 from its joints (Denavit-Hartenberg parameters published by Universal Robots), and what it holds.
+"""Flange of a UR arm from its joints (Denavit-Hartenberg parameters published by Universal Robots), and what it holds.
 
 A real arm has its own calibration, which differs from these by millimetres.
 """
@@ -13,20 +13,20 @@ from robot_io.rig.types import Matrix3
 MOUNT_YAW_RAD = math.pi / 2
 """The arm stands on the base turned by +90 degrees about the vertical."""
 
-_D_M = (0.1273, 0.0, 0.0, 0.163941, 0.1157, 0.0922)
-_A_M = (0.0, -0.612, -0.5723, 0.0, 0.0, 0.0)
+_NO_LENGTH: Joints = (0.0,) * 6
 _SIN_ALPHA = (1.0, 0.0, 0.0, 1.0, -1.0, 0.0)
 _COS_ALPHA = (0.0, 1.0, 1.0, 0.0, 0.0, 1.0)
+"""The same for every model: so is the flange's rotation."""
 
 
-def flange(q: Joints) -> tuple[Matrix3, Vector3]:
-    """Return rotation (rows) and origin (m) of the flange in the arm's base frame, from `q` (rad)."""
+def flange(q: Joints, d_m: Joints = _NO_LENGTH, a_m: Joints = _NO_LENGTH) -> tuple[Matrix3, Vector3]:
+    """Return rotation (rows) and origin of the flange in the arm's base frame, from `q` (rad) and d and a (m)."""
     r: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     x = y = z = 0.0
     for i in range(6):
         c, s = math.cos(q[i]), math.sin(q[i])
         sa, ca = _SIN_ALPHA[i], _COS_ALPHA[i]
-        px, py, pz = _A_M[i] * c, _A_M[i] * s, _D_M[i]
+        px, py, pz = a_m[i] * c, a_m[i] * s, d_m[i]
         x += r[0][0] * px + r[0][1] * py + r[0][2] * pz
         y += r[1][0] * px + r[1][1] * py + r[1][2] * pz
         z += r[2][0] * px + r[2][1] * py + r[2][2] * pz

@@ -7,13 +7,14 @@ from robot_io.ft300.driver import Ft300
 from robot_io.messages import BaseFeed, JointState, SensorWrench
 from robot_io.ridgeback.driver import Ridgeback
 from robot_io.ur10.driver import Ur10
+from robot_io.ur10.tool_force import UrToolForce
 from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 
 
-def sensors(real: Ft300, simulated: SimFt300) -> tuple[Sensor, Driver[SensorWrench]]:
-    return real, simulated
+def sensors(real: Ft300, of_the_arm: UrToolForce, simulated: SimFt300) -> tuple[Sensor, Sensor, Driver[SensorWrench]]:
+    return real, of_the_arm, simulated
 
 
 def arms(real: Ur10, simulated: SimUr10) -> tuple[Driver[JointState], ...]:

@@ -24,6 +24,7 @@ from robot_io.ridgeback.driver import Ridgeback
 from robot_io.rig.config import load_rig
 from robot_io.rig.topics import TopicsConfig
 from robot_io.ur10.driver import Ur10
+from robot_io.ur10.tool_force import UrToolForce
 from sim_backend.ridgeback.settings import ridgeback_settings
 from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
@@ -36,8 +37,14 @@ from tests.wire.ur_process import EmulatorProcess
 
 OWN_DEVICE, _, OWN_KIND = os.environ.get("PUSH_TEST_KIND", "").partition("=")
 OWN_FOLDER = os.environ.get("PUSH_TEST_KIND_FOLDER", "")
-DEVICES = (OWN_KIND,) if OWN_KIND else ("ft300", "ur10", "ridgeback")
-ADDRESSES = {"ft300": "PUSH_TEST_FT300_PORT", "ur10": "PUSH_TEST_UR10_HOST", "ridgeback": "PUSH_TEST_RIDGEBACK_URL"}
+DEVICES = (OWN_KIND,) if OWN_KIND else ("ft300", "ur10", "ridgeback", "ur10e", "ur-tool-force")
+ADDRESSES = {
+    "ft300": "PUSH_TEST_FT300_PORT",
+    "ur10": "PUSH_TEST_UR10_HOST",
+    "ridgeback": "PUSH_TEST_RIDGEBACK_URL",
+    "ur10e": "PUSH_TEST_UR10E_HOST",
+    "ur-tool-force": "PUSH_TEST_UR10E_HOST",
+}
 TOPICS = TopicsConfig(status="")
 """The status comes once a second, and every start would wait for it."""
 
@@ -103,8 +110,10 @@ class OnTheWire:
     def driver(self) -> Any:
         if self.device == "ft300":
             return Ft300(self._address)
-        if self.device == "ur10":
+        if self.device in ("ur10", "ur10e"):
             return Ur10(self._address)
+        if self.device == "ur-tool-force":
+            return UrToolForce(self._address)
         if self.device == OWN_KIND:
             return find_kind(OWN_DEVICE, OWN_KIND, OWN_FOLDER).from_rig(self._address, {})
         return Ridgeback(self._address, topics=TOPICS)
@@ -134,8 +143,9 @@ def emulated(device: str) -> Iterator[OnTheWire]:
     if device == "ft300":
         with ft300_process() as sensor:
             yield OnTheWire(device, sensor.port, lambda: sensor.ask("hang_up"), _stopper(sensor.pid))
-    elif device == "ur10":
-        with EmulatorProcess() as robot:
+    elif device in ("ur10", "ur10e", "ur-tool-force"):
+        options = {} if device == "ur10" else {"model": "ur10e", "wrench": (0.0,) * 6}
+        with EmulatorProcess(**options) as robot:
             stop_or_go = lambda frozen: robot.freeze_process() if frozen else robot.thaw_process()  # noqa: E731
             yield OnTheWire(device, robot.host, robot.kill, stop_or_go)
     elif device == OWN_KIND:

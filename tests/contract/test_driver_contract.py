@@ -26,6 +26,8 @@ LEVELS = [
     pytest.param("emulated", id="emulated"),
     pytest.param("hardware", id="hardware", marks=pytest.mark.hardware),
 ]
+ON_THE_WIRE_ONLY = (("ur10e", "sim"), ("ur-tool-force", "sim"))
+"""At level sim they are the arm and the sensor that every rig has."""
 if OWN_KIND:
     LEVELS = LEVELS[1:2]
 
@@ -41,6 +43,7 @@ def cases(devices=DEVICES):
         pytest.param((device, level.values[0]), id=f"{device}-{level.id}", marks=level.marks)
         for device in devices
         for level in LEVELS
+        if (device, level.values[0]) not in ON_THE_WIRE_ONLY
     ]
 
 

@@ -20,6 +20,8 @@ from safety.faults import FAULTS
 from tests.faults.kill_rounds import Round, pushing, strike, within
 from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import PUSH, QUICK, ROOT, messages, one_error, stands, started, world_of
+from tools.report.run_data import read_run
+from tools.report.run_verdict import verdict
 
 KILL, STOP = signal.SIGKILL, signal.SIGSTOP
 ZERO_MS = 20.0
@@ -247,6 +249,8 @@ def test_all_devices_gone_at_once(state, tmp_path, host):
     assert found.ended.last_object["first_fault"]["id"] == "emulators"
     assert "safety stop after" in found.ended.err
     assert ": the emulators have ended, and with them every emulated device at " in found.ended.err
+    from_the_log = verdict(read_run(tmp_path / "run" / "run.mcap"), {})
+    assert from_the_log.first_fault == "emulators", from_the_log
 
 
 @pytest.mark.long

@@ -51,6 +51,56 @@ print(json.dumps({
 ros.terminate()
 """
 
+ROSLIBPY_INTERFACE = """
+import json, sys, threading, time
+import roslibpy
+ros = roslibpy.Ros("127.0.0.1", int(sys.argv[1]))
+ros.run(timeout=10)
+told = {
+    "service_type": ros.get_service_type("/rosapi/topics"),
+    "services_for_type": ros.get_services_for_type("rosapi/Topics"),
+    "request": ros.get_service_request_details("rosapi/TopicType")["typedefs"][0]["fieldnames"],
+    "response": ros.get_service_response_details("rosapi/TopicType")["typedefs"][0]["fieldnames"],
+    "message": [entry["type"] for entry in ros.get_message_details("geometry_msgs/Twist")["typedefs"]],
+    "node": ros.get_node_details("/vicon_bridge"),
+    "topics_for_type": ros.get_topics_for_type("ridgeback_msgs/Status"),
+}
+parameter = roslibpy.Param(ros, "/gain")
+before = parameter.get()
+parameter.set({"k": [1, 2.5]})
+told["parameter"] = [before, parameter.get(), "/gain" in ros.get_params(), ros.get_param("/gain")]
+parameter.delete()
+told["parameter"].append(parameter.get())
+servers = threading.Event()
+ros.get_action_servers(lambda answer: servers.set())
+told["action_servers"] = servers.wait(5)
+try:
+    roslibpy.Service(ros, "/nobody", "std_srvs/Empty").call(roslibpy.ServiceRequest(), timeout=5)
+except Exception as error:
+    told["refused"] = str(error)
+arrivals = []
+spaced = roslibpy.Topic(ros, "/odometry/filtered", "nav_msgs/Odometry", throttle_rate=200, queue_length=1)
+spaced.subscribe(lambda message: arrivals.append(time.monotonic()))
+until = time.monotonic() + 20
+while len(arrivals) < 6 and time.monotonic() < until:
+    time.sleep(0.01)
+spaced.unsubscribe()
+told["spacing"] = (arrivals[5] - arrivals[0]) / 5
+ros.get_time()  # whatever was under way has come by now
+count = len(arrivals)
+notes = roslibpy.Topic(ros, "/note", "std_msgs/String", latch=True)
+notes.advertise()
+notes.publish(roslibpy.Message({"data": "kept"}))
+heard = threading.Event()
+late = roslibpy.Topic(ros, "/note", "std_msgs/String")
+late.subscribe(lambda message: message["data"] == "kept" and heard.set())
+told["latched"] = heard.wait(5)
+notes.unadvertise()
+told["after_unsubscribe"] = len(arrivals) - count
+ros.terminate()
+print(json.dumps(told))
+"""
+
 ROSLIB = """
 import * as ROSLIB from "roslib";
 const [url, feeds, commands] = [process.argv[2], JSON.parse(process.argv[3]), Number(process.argv[4])];
@@ -108,14 +158,42 @@ def talk(bridge, *command: object, cwd: Path, address: str) -> dict:
     return seen
 
 
-def test_roslibpy(tmp_path):
-    install(sys.executable, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
-    python = tmp_path / "venv" / "bin" / "python"
-    install(python, "-m", "pip", "install", "-q", "roslibpy", cwd=tmp_path)
+@pytest.fixture(scope="module")
+def roslibpy_python(tmp_path_factory):
+    """A Python of its own that has roslibpy."""
+    folder = tmp_path_factory.mktemp("roslibpy")
+    install(sys.executable, "-m", "venv", folder / "venv", cwd=folder)
+    python = folder / "venv" / "bin" / "python"
+    install(python, "-m", "pip", "install", "-q", "roslibpy", cwd=folder)
+    return python
+
+
+def test_roslibpy(roslibpy_python, tmp_path):
     (tmp_path / "client.py").write_text(ROSLIBPY)
     with running_bridge() as bridge:
-        seen = talk(bridge, python, "client.py", cwd=tmp_path, address=bridge.url.rpartition(":")[2])
+        seen = talk(bridge, roslibpy_python, "client.py", cwd=tmp_path, address=bridge.url.rpartition(":")[2])
     assert "/twist_mux" in seen["listeners"]
+
+
+def test_all_that_roslibpy_asks(roslibpy_python, tmp_path):
+    (tmp_path / "client.py").write_text(ROSLIBPY_INTERFACE)
+    with running_bridge() as bridge:
+        line = [str(roslibpy_python), "client.py", bridge.url.rpartition(":")[2]]
+        done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=90)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["service_type"] == "rosapi/Topics"
+    assert told["services_for_type"] == ["/rosapi/topics"]
+    assert (told["request"], told["response"]) == (["topic"], ["type"])
+    assert told["message"] == ["geometry_msgs/Twist", "geometry_msgs/Vector3"]
+    assert "/vicon/ThingBase_4/ThingBase_4" in told["node"]["publishing"]
+    assert told["topics_for_type"] == ["/mcu/status"]
+    assert told["parameter"] == [None, {"k": [1, 2.5]}, True, {"k": [1, 2.5]}, None]
+    assert told["action_servers"]
+    assert "/nobody does not exist" in told["refused"]
+    assert 0.18 < told["spacing"] < 0.4  # throttle_rate 200 ms on a topic of 50 Hz
+    assert told["latched"]
+    assert told["after_unsubscribe"] <= 1
 
 
 def test_npm_roslib(tmp_path):

@@ -59,7 +59,7 @@ LATER = {
 }
 """The same push, by the program at the end of each of these formats: the law has not changed since."""
 WHOLE = {**GOLDEN, **LATER}
-NEWER = {"input.paused", "input.host.law_ns", "control.law_error", "control.law_state"}
+NEWER = {"input.ft.bias_jumps", "input.paused", "input.host.law_ns", "control.law_error", "control.law_state"}
 """Fields of a tick that these logs do not hold."""
 CUT_OFF = LOGS / "emulated-cut-off.mcap"
 SAVED = Golden(5014, 352, 427, (), 30)

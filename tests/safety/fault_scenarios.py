@@ -364,6 +364,7 @@ SCENARIOS = [
     Scenario("F01-hold", "silent", ft(readings=())),
     Scenario("F01-stop", "silent", ft(readings=()), also=frozenset({"F52"})),
     Scenario("F02", "unplugged", ft(link=3)),
+    Scenario("F15", "zeroed", ft(bias_jumps=1)),
     Scenario("F04", "half of the packets", damaged(2)),
     Scenario("F04", "one in four", damaged(4)),
     Scenario("F06", "frozen", reading(force=(BIAS[0], BIAS[1], BIAS[2] - 15.0), torque=BIAS[3:])),

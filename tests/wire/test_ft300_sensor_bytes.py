@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robot_io.clock import NS_PER_MS
 from sim_backend.ft300 import wire
-from sim_backend.ft300.line import WireDirection, next_delivery_ns
+from sim_backend.ft300.line import WireDirection, last_delivery_ns, next_delivery_ns
 from sim_backend.ft300.registers import SensorRegisters
 
 WRENCH = (12.34, -56.78, 100.00, 0.100, -1.230, 3.210)
@@ -106,13 +106,27 @@ def test_the_line_carries_1920_bytes_a_second():
     line.put(b"yy", 2_000)  # while busy until 8.33 ms: it queues behind
     assert line.next_began_ns() == 1_000 + 8_333_328
     assert line.take(9 * NS_PER_MS) == b"y"
+    assert line.taken_ns() == 1_000 + 17 * 520_833
+    assert line.taken_ns(2) == 1_000 + 15 * 520_833
 
 
-def test_the_line_takes_no_more_than_it_can_hold():
+def test_the_line_has_room_for_4096_bytes_before_a_writer_waits():
     line = WireDirection(paced=True)
-    assert line.put(b"x" * 4096, 0)
-    assert not line.put(b"x", 0)
-    assert (len(line), line.room) == (4096, 0)
+    line.put(b"x" * 4000, 0)
+    assert line.room == 96
+    line.put(b"x" * 200, 0)  # closing a port sends all that was written
+    assert line.room < 0
+
+
+def test_a_sender_that_falls_silent_ends_with_the_byte_on_the_line():
+    line = WireDirection(paced=True)
+    line.put(b"0123456789abcdef", 1_000)
+    line.cut(1_000 + 3 * 520_833 + 1)  # the fourth byte is on its way
+    assert line.take(10**9) == b"0123"
+    assert not line.is_busy(1_000 + 4 * 520_833)
+    line.cut(10**9)
+    line.put(b"x", 10**9)
+    assert line.take(10**9 + 520_833) == b"x"
 
 
 @pytest.mark.parametrize(
@@ -127,3 +141,12 @@ def test_the_line_takes_no_more_than_it_can_hold():
 )
 def test_the_adapter_delivers_when_its_timer_fires(arrival, latency, delivered):
     assert next_delivery_ns(arrival, latency) == delivered
+
+
+def test_the_adapters_timer_runs_from_the_opening_of_its_port():
+    since = 5_300_000
+    assert next_delivery_ns(5_300_001, 16, since) == 21_300_000
+    assert next_delivery_ns(21_300_000, 16, since) == 21_300_000
+    assert last_delivery_ns(37_299_999, 16, since) == 21_300_000
+    assert last_delivery_ns(37_300_000, 16, since) == 37_300_000
+    assert last_delivery_ns(7, 0, since) == 7

@@ -97,13 +97,19 @@ class EmulatorProcess:
 def main() -> None:
     """Serve one emulator until stdin ends."""
     from robot_io.ipc.event_loop import EventLoop
+    from sim_backend.ft300.standalone import ConstantWrench
     from sim_backend.ur10.emulator import UrEmulator
+    from sim_backend.ur10.models import BY_NAME
     from sim_backend.ur10.standalone import StillArm
 
     ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # die with the test
     options = json.loads(sys.argv[1])
     if "version" in options:
         options["version"] = tuple(options["version"])
+    if "model" in options:
+        options["model"] = BY_NAME[options["model"]]
+    if "wrench" in options:
+        options["wrench"] = ConstantWrench(tuple(options["wrench"]))
     loop = EventLoop()
     emulator = UrEmulator(loop, StillArm(), **options)
     rest = b""

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from robot_io.errors import EnvironmentFault
@@ -39,20 +40,32 @@ def saved(found: Estimate, rig: RigConfig, raw: Raw | None, out: Path | None, ap
     """
     made = datetime.now(UTC).replace(microsecond=0)
     uncertainty, residual = (tuple(map(_rounded, values)) for values in (found.uncertainty, found.residual))
-    calibration = Calibration(
-        made,
-        _one_or_all(uncertainty),
-        found.unit,
-        _one_or_all(residual),
-        found.source,
-        rig.name,
-        found.unseen,
+    calibration = _as_measured(
+        Calibration(
+            made,
+            _one_or_all(uncertainty),
+            found.unit,
+            _one_or_all(residual),
+            found.source,
+            rig.name,
+            found.unseen,
+        ),
+        rig.calibration.made().get(found.what),
     )
     path = out or default_path(found.what, made)
     keys = found.keys | ({} if devices_at(rig, "hardware") else still_hidden(found, rig))
     write_fragment(path, Fragment(found.what, keys, calibration, found.told))
     readings = _write_readings(path.with_suffix(".csv"), raw) if raw is not None and not raw.empty else None
     return Saved(path, readings, apply_fragment(apply, path) if apply is not None else None)
+
+
+def _as_measured(new: Calibration, before: Calibration | None) -> Calibration:
+    """Return the calibration with what it cannot show as old as it is, where it was measured before by other means."""
+    if not new.unseen or before is None or before.unseen:
+        return new
+    since = before.made.date().isoformat()
+    source = f"{new.source}; {new.unseen} as of {since}, by {before.source or 'unknown means'}"
+    return msgspec.structs.replace(new, made=min(new.made, before.made), source=source, unseen=None)
 
 
 def _write_readings(path: Path, raw: Raw) -> Path:

@@ -27,6 +27,7 @@ from robot_io.ipc.process import fresh_interpreter
 from robot_io.messages import BodyTwist, Pose2D, Vector3
 from robot_io.ridgeback import Ridgeback
 from robot_io.rig.config import RigConfig
+from robot_io.rig.declared import TOOL_FORCE
 from sim_backend.world.truth import true_frames
 from tools.calibrate.people import Act, Done, Drive, PoseArm, Press
 from tools.rig import devices_at, with_addresses
@@ -42,14 +43,15 @@ _PROGRAM = (
     "import signal, sys; from robot_io.ipc.process import die_with_parent; "
     "die_with_parent(int(sys.argv[1]), signal.SIGTERM); from tools.cli import main; sys.exit(main(sys.argv[2:]))"
 )
-_KEYS = {"ft300": ("ft", "port"), "ur10": ("arm", "host"), "ridgeback": ("base", "url")}
+_DEVICES = {"port": "ft", "host": "arm", "url": "base"}
+"""By what an emulator calls its address."""
 
 
 class Emulators:
     """`push emulate all` in a process of its own; told on its stdin what the rehearsed person does."""
 
-    def __init__(self, rig_name: str, overrides: Sequence[str], seed: int) -> None:
-        """Start them; raises EnvironmentFault where they do not come up."""
+    def __init__(self, rig_name: str, overrides: Sequence[str], seed: int, count: int = len(_DEVICES)) -> None:
+        """Start `count` of them; raises EnvironmentFault where they do not come up."""
         command, environment = fresh_interpreter("-")
         pid = os.getpid()
         # Each emulated arm needs an address of its own: its ports are fixed.
@@ -66,7 +68,7 @@ class Emulators:
             start_new_session=True,
         )
         try:
-            self.addresses = self._hear()
+            self.addresses = self._hear(count)
         except BaseException:
             self.close()
             raise
@@ -91,11 +93,11 @@ class Emulators:
                 with contextlib.suppress(OSError):
                     file.close()
 
-    def _hear(self) -> dict[str, str]:
+    def _hear(self, count: int) -> dict[str, str]:
         assert self._process.stdout is not None
         found: dict[str, str] = {}
         deadline_s, rest = time.monotonic() + READY_WITHIN_S, b""
-        while len(found) < len(_KEYS):
+        while len(found) < count:
             left_s = deadline_s - time.monotonic()
             ready = select.select([self._process.stdout], [], [], max(0.0, left_s))[0]
             more = os.read(self._process.stdout.fileno(), 4096) if ready else b""
@@ -108,8 +110,7 @@ class Emulators:
                 told = msgspec.json.decode(line)
                 if "error" in told:
                     raise EnvironmentFault(told["error"]["what"], where=told["error"]["where"], do=told["error"]["do"])
-                device, key = _KEYS[told["device"]]
-                found[device] = told[key]
+                found |= {_DEVICES[key]: address for key, address in told.items() if key in _DEVICES}
         return found
 
 
@@ -118,7 +119,10 @@ def emulators(
     rig: RigConfig, rig_name: str, overrides: Sequence[str], seed: int
 ) -> Iterator[tuple[RigConfig, Emulators]]:
     """Serve the rig's emulated devices; give the rig with their addresses, and the process."""
-    served = Emulators(rig_name, overrides, seed)
+    of_the_arm = rig.ft.kind == TOOL_FORCE
+    served = Emulators(rig_name, overrides, seed, len(_DEVICES) - of_the_arm)
+    if of_the_arm:
+        served.addresses["ft"] = served.addresses["arm"]
     try:
         mine = devices_at(rig, "emulated")
         yield with_addresses(rig, {device: at for device, at in served.addresses.items() if device in mine}), served

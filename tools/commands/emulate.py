@@ -1,4 +1,4 @@
-"""`push emulate ft300|ur10|ridgeback|all`: run the wire emulators for any client, until SIGTERM or Ctrl-C.
+"""`push emulate ft300|ur|ur10|ridgeback|all`: run the wire emulators for any client, until SIGTERM or Ctrl-C.
 
 A single device is fed by a constant source; `all` runs the three on one simulated world, and reads what a person does
 to the robot by hand as JSON lines on stdin (`tools.run.emulated.hands`). Everything listens on loopback only.
@@ -21,13 +21,16 @@ from robot_io.error_report import printable, say_json, tell
 from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import set_timer_slack_1ns
+from robot_io.rig.declared import TOOL_FORCE
 from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.ft300.standalone import ConstantWrench, parse_wrench
 from sim_backend.ridgeback.standalone import standalone_emulator
 from sim_backend.ur10.emulator import UrEmulator
+from sim_backend.ur10.models import BY_NAME
 from sim_backend.ur10.standalone import StillArm
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
+from tools.run.emulated import modelled
 from tools.run.emulated.emulators import Emulator, endpoint, open_ft300, open_ridgeback, open_ur10
 from tools.run.emulated.hands import Hands
 from tools.terminal.arguments import SEED, name_or_path, number
@@ -42,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the devices and their flags."""
     devices = parser.add_subparsers(dest="device", required=True, metavar="DEVICE")
 
-    ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty")
+    ft = devices.add_parser("ft300", help="Robotiq FT 300 on a pty", description=modelled.FT300)
     wrench = "FX,FY,FZ,MX,MY,MZ"
     ft.add_argument("--wrench", default="0,0,0,0,0,0", metavar=wrench, help="N, N*m; as in --wrench=-10,0,0,0,0,0")
     ft.add_argument(
@@ -55,11 +58,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     ft.set_defaults(open_devices=_open_ft300)
 
-    ur = devices.add_parser("ur10", help="UR10 controller (RTDE, scripts, dashboard) standing still")
-    ur.add_argument("--host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST}); one robot per address")
-    ur.set_defaults(open_devices=_open_ur10)
+    wrench_help = "what the sensor at the flange reads: N, N*m; as in --wrench=-10,0,0,0,0,0"
+    ur = devices.add_parser("ur", help="UR controller (RTDE, scripts, dashboard), CB3 or e-Series, standing still")
+    ur.add_argument(
+        "--model", type=str.lower, choices=tuple(BY_NAME), default="ur10", help="which arm (ur10); with an e: e-Series"
+    )
+    ur.add_argument("--wrench", metavar=wrench, help=f"{wrench_help} (e-Series)")
+    ur10 = devices.add_parser("ur10", help="the same as `ur --model ur10`")
+    ur10.set_defaults(model="ur10", wrench=None)
+    for arm in (ur, ur10):
+        arm.add_argument(
+            "--host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST}); one robot per address"
+        )
+        arm.set_defaults(open_devices=_open_ur)
 
-    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server")
+    base = devices.add_parser("ridgeback", help="Ridgeback behind a rosbridge server", description=modelled.RIDGEBACK)
     base.add_argument("--host", type=_loopback, default=BASE_HOST, help=f"127.x.y.z ({BASE_HOST})")
     base.add_argument("--port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")
     base.set_defaults(open_devices=_open_ridgeback)
@@ -79,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     everything.add_argument("--base-port", type=_port, default=BASE_PORT, help=f"0 picks a free one ({BASE_PORT})")
     everything.set_defaults(open_devices=_open_all)
 
-    for device in (ft, ur, base, everything):
+    for device in (ft, ur, ur10, base, everything):
         device.add_argument("--json", action="store_true", help="one JSON line per endpoint on stdout")
 
 
@@ -134,9 +147,15 @@ def _open_ft300(loop: EventLoop, args: argparse.Namespace, opened: contextlib.Ex
     return [emulator]
 
 
-def _open_ur10(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+def _open_ur(loop: EventLoop, args: argparse.Namespace, opened: contextlib.ExitStack) -> list[Emulator]:
+    model = BY_NAME[args.model]
+    if args.wrench is not None and model.force_range_N is None:
+        raise UsageError(
+            f"a {model.name} has no force sensor", where="--wrench", do="Give an e-Series arm: --model ur10e"
+        )
+    wrench = None if model.force_range_N is None else ConstantWrench(parse_wrench(args.wrench or "0,0,0,0,0,0"))
     with _elsewhere("--host 127.x.y.z"):
-        emulator = UrEmulator(loop, StillArm(), host=args.host)
+        emulator = UrEmulator(loop, StillArm(), host=args.host, model=model, wrench=wrench)
     opened.callback(emulator.close)
     return [emulator]
 
@@ -159,7 +178,7 @@ def _open_all(loop: EventLoop, args: argparse.Namespace, opened: contextlib.Exit
             lambda: open_ridgeback(loop, world, rig, args.base_host, args.base_port),
             "--base-host 127.x.y.z or --base-port",
         ),
-    ):
+    )[rig.ft.kind == TOOL_FORCE :]:  # then the arm is the sensor
         with _elsewhere(options):
             emulators.append(open_device())
         opened.callback(emulators[-1].close)

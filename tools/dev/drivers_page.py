@@ -42,7 +42,7 @@ first used.
 - **Errors.** `open` and `start` raise errors of [one tree](#errors), each with `what`, `where` and `do`. A link that is
   lost later raises nothing: `drain` returns nothing more, `health` reports `LOST` and why. A driver never reconnects by
   itself: open it again.
-- **Emulators.** No device? `push emulate ft300`, `ur10` or `ridgeback` in a checkout serves the real protocol to
+- **Emulators.** No device? `push emulate ft300`, `ur` or `ridgeback` in a checkout serves the real protocol to
   any client.
 """
 
@@ -63,6 +63,7 @@ class Part(NamedTuple):
 PARTS = (
     Part("Force-torque sensor", "robot_io.ft300", ("Ft300", "Ft300Reading"), "robot_io.ft300.driver", "Ft300"),
     Part("Held arm", "robot_io.ur10", ("Ur10",), "robot_io.ur10.driver", "Ur10"),
+    Part("Force sensor of the arm", "robot_io.ur10", ("UrToolForce",), "robot_io.ur10.tool_force"),
     Part("Mobile base", "robot_io.ridgeback", ("Ridgeback",), "robot_io.ridgeback.driver", "Ridgeback"),
     Part(
         "Devices by kind",

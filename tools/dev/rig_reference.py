@@ -23,7 +23,7 @@ from robot_io.rig.types import row_of, table_of
 INTRO = """# Rig files
 
 A rig file is TOML and describes one robot, real or not. `push run NAME` uses a shipped one (`sim`, `emulated`,
-`barrel`, `paper-gains`, `thing`), `push run FILE` your own. Write only what differs:
+`barrel`, `paper-gains`, `ur10e-emulated`, `thing`), `push run FILE` your own. Write only what differs:
 
     extends = "emulated"
     name = "mine"

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import time
 
-from robot_io.errors import DeviceError, DeviceProtocolError
+from robot_io.errors import DeviceError, PushError
 from robot_io.messages import ArmState
 from robot_io.rig.config import RigConfig
+from robot_io.ur10.generation import Generation, Version, generation_of, model_of, wanted_model
 from robot_io.ur10.look import (
     INPUTS,
     LOOK_WITHIN_S,
@@ -18,7 +19,7 @@ from robot_io.ur10.look import (
     inputs_in_use,
     receive,
 )
-from robot_io.ur10.preflight import MODEL, check_version, read_version
+from robot_io.ur10.preflight import read_version
 from safety.checks.arm_checks import MAX_JOINT_SPEED_RAD_PER_S
 from tools.doctor.check import Check, Rows
 from tools.verdict.arm_pose import JOINTS, whole_turns
@@ -33,7 +34,13 @@ def arm_checks(rig: RigConfig) -> list[Check]:
     rows, host = Rows("arm"), rig.arm.host
     try:
         version = read_version(host, time.monotonic() + LOOK_WITHIN_S)
-        words = ask_dashboard(host)
+        try:
+            generation = generation_of(host, version)
+        except DeviceError as error:
+            rows.ok("ports", f"RTDE answers at {host}")
+            rows.error("version", error)
+            return rows.all("this controller is not known")
+        words = ask_dashboard(host, generation)
         packets = receive(host)
         if rig.arm.hold == "servo":
             accepts_scripts(host)
@@ -42,7 +49,7 @@ def arm_checks(rig: RigConfig) -> list[Check]:
         return rows.all("the controller was not reached")
     ports = "dashboard, RTDE and scripts" if rig.arm.hold == "servo" else "dashboard and RTDE"
     rows.ok("ports", f"{ports} answer at {host}; {len(packets)} packets in a row")
-    _version(rows, host, version, words)
+    _version(rows, rig, version, generation, words)
     state = ArmState(packets[-1].modes.state(own_program=False))
     _safety(rows, state, words)
     _mode(rows, state, words, packets[-1])
@@ -51,18 +58,14 @@ def arm_checks(rig: RigConfig) -> list[Check]:
     return rows.all("the controller did not say")
 
 
-def _version(rows: Rows, host: str, version: tuple[int, int, int, int], words: DashboardWords) -> None:
+def _version(rows: Rows, rig: RigConfig, version: Version, generation: Generation, words: DashboardWords) -> None:
     number = ".".join(map(str, version))
-    told = f"{words.model[:40]} {words.serial[:40]}, PolyScope {number}"
-    if words.model != MODEL:
-        rows.bad("version", "failed", f"{told}: not a {MODEL}", "Give the address of the UR10", number)
-        return
     try:
-        check_version(host, version)
-    except DeviceProtocolError as error:
+        model = model_of(rig.arm.host, generation, words.model, wanted_model(rig.arm.options))
+    except PushError as error:
         rows.error("version", error)
     else:
-        rows.ok("version", told, number)
+        rows.ok("version", f"{model} {words.serial[:40]}, {generation.name}, PolyScope {number}", number)
 
 
 def _safety(rows: Rows, state: ArmState, words: DashboardWords) -> None:

@@ -54,6 +54,11 @@ class Rows:
         self._of = of
         self._found: dict[str, Check] = {}
 
+    @property
+    def found(self) -> frozenset[str]:
+        """The short names of the rows found so far."""
+        return frozenset(self._found)
+
     def ok(
         self, name: str, evidence: str, value: float | str | None = None, limit: float | None = None, unit: str = ""
     ) -> None:

@@ -17,11 +17,12 @@ from robot_io.ipc.process import die_with_parent, set_timer_slack_1ns, try_realt
 from robot_io.ipc.spawn import spawn
 from robot_io.ipc.status import StatusPipe
 from robot_io.rig.config import RigConfig, rig_from_toml, rig_to_toml
+from robot_io.rig.declared import TOOL_FORCE
 from robot_io.rig.fault_words import WHERE
 from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.injection.wire_arm import spoil_arm
 from sim_backend.injection.wire_base import spoil_base
-from sim_backend.injection.wire_sensor import spoil_sensor
+from sim_backend.injection.wire_sensor import LINE_KINDS, spoil_sensor, spoil_tool_force
 from sim_backend.injection.wire_words import parse_wire_fault
 from sim_backend.ridgeback.emulator import RosbridgeEmulator
 from sim_backend.ur10.emulator import UrEmulator
@@ -82,6 +83,8 @@ def spoil(loop: EventLoop, opened: Mapping[str, Emulator], faults: Sequence[str]
         mine = [fault for fault in words if fault.device.partition(".")[0] == device]
         if isinstance(emulator, Ft300Emulator):
             spoil_sensor(emulator, mine, rig)
+        elif isinstance(emulator, UrEmulator) and device == "ft":
+            spoil_tool_force(emulator, mine, rig)
         elif isinstance(emulator, UrEmulator):
             spoil_arm(emulator, mine)
         elif isinstance(emulator, RosbridgeEmulator):
@@ -97,6 +100,10 @@ def check_faults(rig: RigConfig, faults: Sequence[str]) -> None:
                 f"`{text}`: {device} is not emulated by this program in rig {rig.name!r}",
                 where=WHERE,
                 do="Use the rig `emulated`",
+            )
+        if device == "ft" and rig.ft.kind == TOOL_FORCE and parse_wire_fault(text).kind in LINE_KINDS:
+            raise ConfigError(
+                f"`{text}`: {TOOL_FORCE} has no line of its own", where=WHERE, do="Let the arm do it, or use an FT 300"
             )
 
 

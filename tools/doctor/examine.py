@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from robot_io.rig.config import RigConfig
+from robot_io.rig.declared import TOOL_FORCE
 from tools.doctor.check import NAMES, Check
 from tools.doctor.emulated import emulators
 from tools.doctor.host_checks import host_checks
@@ -66,11 +67,15 @@ def device_checks(rig: RigConfig, device: str, held: Held) -> list[Check]:
         return _skipped(device, f"in use by another run ({held[device]})")
     if not is_shipped(device, kind):
         return _skipped(device, f"`{kind}` is not of this program")
-    return _checks(device)(rig)
+    return _checks(device, kind)(rig)
 
 
-def _checks(device: str) -> Callable[[RigConfig], list[Check]]:
+def _checks(device: str, kind: str) -> Callable[[RigConfig], list[Check]]:
     """Return the checks of a device; imported late, because level sim needs no wire."""
+    if kind == TOOL_FORCE:
+        from tools.doctor.tool_force_checks import tool_force_checks
+
+        return tool_force_checks
     if device == "ft":
         from tools.doctor.ft_checks import ft_checks
 

@@ -142,7 +142,7 @@ def _look(rows: Rows, rig: RigConfig, preflight: Ft300Preflight) -> None:
     _latency(rows, rig.ft.port, heard, polled)
     _line(rows, rig, heard, polled)
     if polled is not None:
-        _readings(rows, rig, polled.readings)
+        judge_readings(rows, rig, polled.readings)
 
 
 def _latency(rows: Rows, port: str, heard: Heard | None, polled: Polled | None) -> None:
@@ -173,13 +173,13 @@ def _line(rows: Rows, rig: RigConfig, heard: Heard | None, polled: Polled | None
     """Judge how fast readings come, and how many bytes arrive damaged."""
     if heard is not None:
         rate_hz = rig.ft.declared.rate_hz
-        _rate(rows, heard.rate_hz, rate_hz, "Hz", f"found streaming at {heard.rate_hz:.1f} Hz")
+        judge_rate(rows, heard.rate_hz, rate_hz, "Hz", f"found streaming at {heard.rate_hz:.1f} Hz")
     elif polled is not None and polled.answered:
         share = polled.fresh / polled.asked
         per_s = polled.answered / polled.span_s
         evidence = f"{polled.answered} of {polled.asked} questions answered, {per_s:.0f} a second, {polled.fresh} new"
         if min(rig.scatters[:3]):
-            _rate(rows, share * 100.0, 100.0, "%", evidence)
+            judge_rate(rows, share * 100.0, 100.0, "%", evidence)
         else:
             rows.ok("rate", f"{evidence} (without noise none need differ)")
     elif polled is not None:
@@ -196,16 +196,18 @@ def _line(rows: Rows, rig: RigConfig, heard: Heard | None, polled: Polled | None
         rows.bad("crc", "failed" if share >= most else "warning", evidence, fix, share, most, "%")
 
 
-def _rate(rows: Rows, value: float, full: float, unit: str, evidence: str) -> None:
+def judge_rate(
+    rows: Rows, value: float, full: float, unit: str, evidence: str, fix: str = f"Check the cable. {POWER_CYCLE}"
+) -> None:
+    """Judge a rate, or a share of the readings, by what is full."""
     low, least = LOW_RATE_SHARE * full, LEAST_RATE_SHARE * full
     if value > low:
         rows.ok("rate", evidence, round(value, 1), low, unit)
         return
-    fix = f"Check the cable. {POWER_CYCLE}"
     rows.bad("rate", "failed" if value <= least else "warning", evidence, fix, round(value, 1), low, unit)
 
 
-def _readings(rows: Rows, rig: RigConfig, readings: tuple[SensorWrench, ...]) -> None:
+def judge_readings(rows: Rows, rig: RigConfig, readings: tuple[SensorWrench, ...]) -> None:
     """Judge noise and bias as a tare would."""
     if len(readings) < SMALLEST_COUNT:
         return

@@ -120,6 +120,7 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F11", "it lifts", ("ft.wrong=15",), APPROACH, begins=touching),
     Scenario("F12-low", "half of the packets", ("ft.slow=50",)),
     Scenario("F12-hold", "a third of the packets", ("ft.slow=33",)),
+    Scenario("F15", "zeroed", ("ft.zeroed",)),
     *(Scenario("F20-hold", f"joint {i} has moved", (f"arm.wrong={'0,' * i}0.006",)) for i in range(6)),
     Scenario("F20-stop", "a joint has moved", ("arm.wrong=0.011",)),
     Scenario("F21", "a joint turns", ("arm.moving=0.03",)),

@@ -16,6 +16,7 @@ import msgspec
 from robot_io.errors import DeviceUnreachable, EnvironmentFault
 from robot_io.look_up import addresses_of
 from robot_io.rig.config import RigConfig
+from robot_io.rig.declared import TOOL_FORCE
 from tools.kinds import is_shipped
 from tools.places.state_dir import state_dir
 from tools.rig import devices_at, kinds_of
@@ -41,7 +42,8 @@ def resources_of(rig: RigConfig) -> list[Resource]:
     """Return what the rig's devices at level hardware need: serial ports, and addresses of hosts. May look up names."""
     real, kinds = devices_at(rig, "hardware"), kinds_of(rig)
     addresses = {"ft": rig.ft.port, "arm": rig.arm.host, "base": rig.base.url}
-    finders = {"ft": _sensor_keys, "arm": _arm_keys, "base": _base_keys}
+    sensor_keys = _arm_keys if rig.ft.kind == TOOL_FORCE else _sensor_keys  # the arm's own: one lock for both
+    finders = {"ft": sensor_keys, "arm": _arm_keys, "base": _base_keys}
     return [
         Resource(key, addresses[device], device)
         for device in real
@@ -86,11 +88,12 @@ class FreeDevices:
         self.held: dict[str, str] = {}
         self._fds: list[int] = []
         try:
-            for resource in {found.key: found for found in resources_of(rig)}.values():
+            needed = resources_of(rig)
+            for resource in {found.key: found for found in needed}.values():
                 try:
                     self._fds.append(_lock(resource, rig.name))
                 except InUse as error:
-                    self.held[resource.device] = error.holder
+                    self.held |= {found.device: error.holder for found in needed if found.key == resource.key}
         except BaseException:
             self.__exit__()
             raise

@@ -20,17 +20,21 @@ def escaped(text: str) -> str:
     return html.escape(re.sub(" {2,}", " ", shown), quote=True)
 
 
-def table(heads: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 0) -> str:
-    """Return an HTML table, "" without rows; the last `numbers` columns are right-aligned."""
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 0, *, stacked: bool = False) -> str:
+    """Return an HTML table, "" without rows; the last `numbers` columns are right-aligned.
+
+    stacked: on a phone each row becomes a list, its cells below each other with the heads beside them.
+    """
     if not rows:
         return ""
     classes = [' class="n"' if i >= len(heads) - numbers else "" for i in range(len(heads))]
-    lines = ['<div class="wide"><table>']
+    names = [f' data-head="{escaped(head)}"' if stacked and head else "" for head in heads]
+    lines = [f'<div class="wide{" stacked" if stacked else ""}"><table>']
     if any(heads):
         cells = "".join(f"<th{c}>{escaped(head)}</th>" for c, head in zip(classes, heads, strict=True))
         lines.append(f"<tr>{cells}</tr>")
     for row in rows:
-        cells = "".join(f"<td{c}>{escaped(cell)}</td>" for c, cell in zip(classes, row, strict=True))
+        cells = "".join(f"<td{c}{n}>{escaped(cell)}</td>" for c, n, cell in zip(classes, names, row, strict=True))
         lines.append(f"<tr>{cells}</tr>")
     return "\n".join([*lines, "</table></div>"])
 

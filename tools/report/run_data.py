@@ -85,6 +85,8 @@ class RunData:
     messages: int
     duration_s: float
     config_text: str = ""
+    world_end_s: float | None = None
+    """When the emulated or simulated world last spoke; None where there is none."""
     run_facts: dict[str, str] = field(default_factory=dict)
     """The `facts` known at the start of the run: together with the config they identify it."""
 
@@ -121,6 +123,7 @@ class _Reader:
         self._types: dict[str, LoggedType[Any]] = {}
         self._ticks = Series(TICK_COLUMNS)
         self._world = Series(SLIDER_COLUMNS)
+        self._world_end_s: float | None = None
         self._seen = Series(SLIDER_COLUMNS)
         self._late = Tally()
         self._skipped = 0
@@ -169,9 +172,11 @@ class _Reader:
                 self._skips.append((time_s, timing.skipped))
         elif topic == "/safety/event":
             self._event(time_s, self._types[topic].decode(payload))
-        elif topic == "/world/state" and self._world.wants():
-            slider = self._types[topic].decode(payload).slider
-            self._world.add((time_s, slider.x, slider.y, slider.yaw))
+        elif topic == "/world/state":
+            self._world_end_s = time_s
+            if self._world.wants():
+                slider = self._types[topic].decode(payload).slider
+                self._world.add((time_s, slider.x, slider.y, slider.yaw))
         # A simulated run's /slider/pose is derived from the world's state, so the world takes precedence.
         elif topic == "/slider/pose" and not len(self._world) and self._seen.wants():
             pose = self._types[topic].decode(payload).pose
@@ -210,6 +215,7 @@ class _Reader:
             messages=self._messages,
             duration_s=self._end_s - self._first_tick_s,
             config_text=self._text,
+            world_end_s=None if self._world_end_s is None else self._world_end_s - self._first_tick_s,
             run_facts=self.metadata.get(RUN_METADATA, {}),
         )
 

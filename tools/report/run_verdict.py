@@ -14,9 +14,12 @@ from safety.faults import FAULTS
 from tools.report.run_data import RunData
 from tools.terminal.verdict import cause_words, contact_loss_reason
 from tools.verdict.evidence import TrustItem, gather
-from tools.verdict.first_cause import fault_words, first_fault
+from tools.verdict.first_cause import fault_words, first_fault, with_dead_emulators
 from tools.verdict.judgement import CONTACT_LOST, judge
 from tools.verdict.witness import Witness
+
+WORLD_SILENT_S = 0.15
+"""An emulated world that says nothing for so long before the last tick has ended: 15 states of it are missing."""
 
 
 class Verdict(NamedTuple):
@@ -42,7 +45,7 @@ def verdict(run: RunData, summary: dict[str, Any]) -> Verdict:
     end = _figures(run, run.last)
     trust = _told(summary) or tuple(gather(run.rig, end, _witness(run), _ended_s(run, run.last)))
     distance, lateral = f"{end['distance_m']:.2f} m", f"{end['lateral_error_m']:+.3f} m"
-    first = first_fault(run.rig, end)
+    first = first_fault(run.rig, with_dead_emulators(end | {"first_tick_ns": 0}, _emulators_died_ns(run)))
     why = cause_words(first, end["faults"]) if first else _without_first(end["faults"])
     if not run.last.output.finished:
         phase = str(end["phase"]).lower().replace("_", " ")
@@ -76,6 +79,17 @@ def trust_rows(trust: tuple[TrustItem, ...]) -> list[tuple[str, str, str]]:
     """Return (name, what it says of the run, in words) for each piece of evidence, those against it first."""
     order = {"against": 0, "unknown": 1, "for": 2}
     return [(i.id.replace("_", " "), i.says, i.text) for i in sorted(trust, key=lambda i: order[i.says])]
+
+
+def _emulators_died_ns(run: RunData) -> int:
+    """Return when the emulators ended (ns since the first tick), as far as a log shows it: 0 if they lived on.
+
+    Their world is logged 100 times a second until the loop has ended.
+    """
+    if run.world_end_s is None or run.first is None or run.last is None:
+        return 0
+    end_s = (run.last.input.now_ns - run.first.input.now_ns) / NS_PER_S
+    return round(run.world_end_s * NS_PER_S) if end_s - run.world_end_s > WORLD_SILENT_S else 0
 
 
 def _figures(run: RunData, last: ControlTick) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from robot_io.ipc.gate_frame import GateFrame
 from robot_io.log.gate_log import GateLog
 from robot_io.messages import ArmRecord
 from robot_io.rig.config import RigConfig, rig_from_toml
-from robot_io.rig.declared import FT300_FACTS
+from robot_io.rig.declared import FT300, FT300_FACTS
 from robot_io.rig.fault_words import FaultWord
 from robot_io.tick import TICK_CDR, ControlTick, HostInput, Operator, TickInput, TickOutput, TickState
 from safety.gate_shell import GateShell
@@ -35,7 +35,7 @@ from sim_backend.sim.ft300 import SimFt300
 from sim_backend.sim.ridgeback import SimRidgeback
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.world.world import World
-from tools.kinds import is_shipped, name_of
+from tools.kinds import name_of
 from tools.live.feed import LiveFeed
 from tools.log.run_log import RunLog
 from tools.log.world_log import ring_listener
@@ -84,7 +84,7 @@ class Lockstep:
         self.world = World(rig, seed, START_NS, ring_listener(push))
         world = rig.world
         self._ft = simulated_sensor(rig, self.world, self._clock)
-        self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_rate_hz, phase=world.arm_phase)
+        self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_cycle_hz, phase=world.arm_phase)
         self._base = SimRidgeback(
             self.world, self._clock, settings=ridgeback_settings(rig, seed), pose_source=rig.base.pose_source
         )
@@ -223,7 +223,7 @@ def open_log(
 def simulated_sensor(rig: RigConfig, world: World, clock: ClockNs) -> SimFt300:
     """Return the sensor of level sim: an FT 300, or any other kind as it declares itself."""
     model, facts = rig.world.sensor, rig.ft.declared
-    if is_shipped("ft", rig.ft.kind):
+    if rig.ft.kind == FT300:
         return SimFt300(world, clock, rate_hz=model.rate_hz, phase=model.phase, latency_ms=model.latency_ms)
     # Never an exact multiple of the loop's rate, or every run would test one fixed phase.
     rate_hz = facts.rate_hz * model.rate_hz / FT300_FACTS.rate_hz

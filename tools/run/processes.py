@@ -33,6 +33,7 @@ from robot_io.ipc.ring import Ring
 from robot_io.ipc.spawn import Child, spawn
 from robot_io.rig.config import RigConfig, rig_to_toml
 from robot_io.ur10.driver import spawn_arm
+from robot_io.ur10.generation import wanted_model
 from robot_io.ur10.job import ArmJob
 from safety.gate_process import GateJob
 from safety.motion_bounds import total_bounds
@@ -197,7 +198,10 @@ class Processes:
             self._spawn("arm", "tools.run.arm_process", own, [record_fd, self._run[0]])
             return
         pose, tolerance_rad = rig.arm.held_pose_rad, rig.arm.held_pose_tolerance_rad
-        job = ArmJob(rig.arm.host, rig.arm.hold, record_fd, os.getpid(), pose, tolerance_rad, run_fd=self._run[0])
+        model = wanted_model(rig.arm.options)
+        job = ArmJob(
+            rig.arm.host, rig.arm.hold, record_fd, os.getpid(), model, pose, tolerance_rad, run_fd=self._run[0]
+        )
         self._adopt(spawn_arm(job))
 
     def _start_control(self, rig: RigConfig, gate_fd: int, base_fd: int, arm_fd: int, operator_fd: int) -> None:

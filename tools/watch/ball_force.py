@@ -104,10 +104,10 @@ def drawing(body: Vector3, *, rows: int = 7, unicode: bool = True) -> list[str]:
     return ["".join(line) for line in grid]
 
 
-def mean_force(forces: list[Vector3]) -> Vector3:
-    """Return the mean of at least one force, axis by axis."""
-    n = len(forces)
-    return sum(f[0] for f in forces) / n, sum(f[1] for f in forces) / n, sum(f[2] for f in forces) / n
+def mean(vectors: list[Vector3]) -> Vector3:
+    """Return the mean of at least one force or torque, axis by axis."""
+    n = len(vectors)
+    return sum(v[0] for v in vectors) / n, sum(v[1] for v in vectors) / n, sum(v[2] for v in vectors) / n
 
 
 def _opposite(force: Vector3) -> Vector3:

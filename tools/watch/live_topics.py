@@ -9,6 +9,7 @@ from robot_io.log.gate_log import GateLog
 from robot_io.log.ros_messages import (
     BASE_FRAME,
     SENSOR_FRAME,
+    SENSOR_WORLD_FRAME,
     WORLD_FRAME,
     Header,
     TFMessage,
@@ -28,8 +29,6 @@ from tools.log.scene_topics import scene_messages
 from tools.log.tick_topics import JOINT_NAMES, Message, message
 from tools.watch.reports import DeviceReport
 from tools.watch.view import View
-
-_NO_TORQUE = Vector3(0.0, 0.0, 0.0)
 
 
 class LiveTopics:
@@ -54,14 +53,16 @@ class LiveTopics:
                 self._frame(sample.value, sample.received_ns)
 
     def show(self, view: View) -> None:
-        """Feed the force on the object, as a run logs it: N, WORLD frame; then send what has been collected."""
+        """Feed the wrench on the object, as a run logs it; then send what has been collected."""
         pose = view.base.pose
-        if view.force is not None and view.force.path is not None and pose is not None:
+        torque = view.torque_on_object
+        if view.force is not None and torque is not None and pose is not None:
             x, y, z = view.force.body
             on_object = (*rotated(-x, -y, pose[2]), -z)
             now_ns = monotonic_ns() + self._offset_ns
-            header = Header(ros_time(now_ns), WORLD_FRAME)
-            self._add(message("/ft/wrench", now_ns, WrenchStamped(header, Wrench(Vector3(*on_object), _NO_TORQUE))))
+            header = Header(ros_time(now_ns), SENSOR_WORLD_FRAME)
+            wrench = Wrench(Vector3(*on_object), Vector3(*torque))
+            self._add(message("/ft/wrench", now_ns, WrenchStamped(header, wrench)))
         self._feed.flush()
 
     def _wrench(self, sample: Stamped[SensorWrench]) -> None:

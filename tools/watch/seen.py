@@ -81,6 +81,7 @@ class Seen:
         self.rig = rig
         self.tare = WatchTare(Settings.of(rig), rig.ft.declared.rate_hz)
         self.bias: Vector3 | None = None
+        self.bias_torque: Vector3 | None = None
         self.tare_words = ""
         self.readings: deque[FtReading] = deque(maxlen=2048)
         self.links = {device: Link("opening") for device in DEVICES}
@@ -109,7 +110,7 @@ class Seen:
         )
         self._take_readings(readings)
         self.tare.take(readings)
-        self.bias, self.tare_words = self.tare.bias, self.tare.words
+        self.bias, self.bias_torque, self.tare_words = self.tare.bias, self.tare.bias_torque, self.tare.words
         for joints in report.arm:
             self.arm = joints.value
             self.rates["arm"].note(joints.seq, joints.received_ns)
@@ -122,6 +123,7 @@ class Seen:
         control, base = report.control, report.base
         self._take_readings(report.readings)
         self.bias = control.bias_force if control.tared else None
+        self.bias_torque = control.bias_torque if control.tared else None
         self.tare_words = "tared by the run" if control.tared else "the run has not tared yet: the bias is unknown"
         self.links["ft"] = _link(report.ft_link)
         self.links["arm"] = _link(report.arm.link)
@@ -141,12 +143,12 @@ class Seen:
         mode = "PAUSED" if report.paused else Mode(report.mode).name
         self.stage = Stage(Phase(control.phase).name, mode, control.progress_m, report.faults)
 
-    def recent_forces(self) -> list[Vector3]:
-        """Return the readings of the last MEAN_NS before the newest, N, SENSOR frame, bias still in them."""
+    def recent(self) -> list[FtReading]:
+        """Return the readings of the last MEAN_NS before the newest: N, N*m, SENSOR frame, bias still in them."""
         if not self.readings:
             return []
         since_ns = self.readings[-1].received_ns - MEAN_NS
-        return [reading.force for reading in self.readings if reading.received_ns > since_ns]
+        return [reading for reading in self.readings if reading.received_ns > since_ns]
 
     def _take_readings(self, readings: tuple[FtReading, ...]) -> None:
         self.readings.extend(readings)

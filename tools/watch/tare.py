@@ -13,7 +13,7 @@ HANDS_OFF = "taring for a second: touch neither ball nor arm"
 
 
 class WatchTare:
-    """Counts readings from `begin` on until there are enough for a bias (N, SENSOR frame)."""
+    """Counts readings from `begin` on until there are enough for a bias (N, and N*m, SENSOR frame)."""
 
     def __init__(self, settings: Settings, rate_hz: float) -> None:
         """rate_hz: readings a second that the sensor declares."""
@@ -25,6 +25,7 @@ class WatchTare:
         """Forget the bias and count anew."""
         self._sums = TareSums()
         self.bias: Vector3 | None = None
+        self.bias_torque: Vector3 | None = None
         self.words = HANDS_OFF
 
     def take(self, readings: tuple[FtReading, ...]) -> None:
@@ -43,5 +44,5 @@ class WatchTare:
         found = judge(
             self._sums, settings.sensor_noise, settings.sensor_range, settings.sensor_resolution, settings.scatters
         )
-        self.bias = found.tare.bias[:3]
+        self.bias, self.bias_torque = found.tare.bias[:3], found.tare.bias[3:]
         self.words = f"tare doubtful: {found.what}" if found.what else "tared here"

@@ -9,11 +9,12 @@ import msgspec
 
 from control.base_velocity import contact_point_world
 from control.settings import Settings
+from control.wrench import force_on_slider_world
 from robot_io.clock import NS_PER_MS
-from robot_io.messages import ArmState, BasePose
+from robot_io.messages import ArmState, BasePose, Vector3
 from robot_io.rig.config import RigConfig
 from tools.verdict.arm_pose import JOINTS
-from tools.watch.ball_force import BallForce, ball_force, mean_force
+from tools.watch.ball_force import BallForce, ball_force, mean
 from tools.watch.seen import Link, Seen, Stage
 
 SCHEMA = 1
@@ -61,6 +62,8 @@ class View(msgspec.Struct, frozen=True):
     tare: str
     force: BallForce | None
     """Of the last 0.2 s; None before a tare and without readings."""
+    torque_on_object: Vector3 | None
+    """Of the same time: N*m, about the sensor's origin, axes of WORLD; None also without a heading of the base."""
     lateral_m: float | None
     """y_c: how far the ball's centre is left of the path."""
     links: dict[str, Link]
@@ -81,15 +84,18 @@ def view_of(seen: Seen, source: str, now_ns: int) -> View:
         contact = contact_point_world(pose.x, pose.y, pose.yaw, settings.contact_x, settings.contact_y)
         lateral_m = finite(settings.path.lateral(*contact))
     feeds = {name: _feed(seen, name, at_ns) for name in seen.rates}
-    force = None
-    if seen.bias is not None and feeds["ft"].rate_hz is not None and (recent := seen.recent_forces()):
-        yaw = pose.yaw if pose is not None else None
-        force = ball_force(mean_force(recent), seen.bias, settings.base_from_sensor, yaw, settings.path)
+    force = torque = None
+    if seen.bias is not None and feeds["ft"].rate_hz is not None and (recent := seen.recent()):
+        yaw, mounted = pose.yaw if pose is not None else None, settings.base_from_sensor
+        force = ball_force(mean([one.force for one in recent]), seen.bias, mounted, yaw, settings.path)
+        if yaw is not None and seen.bias_torque is not None:
+            torque = force_on_slider_world(mean([one.torque for one in recent]), seen.bias_torque, mounted, yaw)
     return View(
         seen.rig.name,
         source,
         seen.tare_words,
         force,
+        torque,
         lateral_m,
         dict(seen.links),
         feeds,

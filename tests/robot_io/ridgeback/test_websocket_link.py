@@ -114,8 +114,8 @@ def test_the_driver_says_so_and_raises_nothing(ends, last_stderr_line):
     base.close()
 
 
-@pytest.mark.parametrize(("quiet_ns", "moves"), [(99_999_999, True), (100_000_000, True), (100_000_001, False)])
-def test_nothing_that_moves_leaves_on_a_link_that_was_quiet_for_100_ms(ends, quiet_ns, moves):
+@pytest.mark.parametrize(("quiet_ns", "moves"), [(69_999_999, True), (70_000_000, True), (70_000_001, False)])
+def test_nothing_that_moves_leaves_on_a_link_that_was_quiet_for_70_ms(ends, quiet_ns, moves):
     link, _ = ends
     now_ns = time.monotonic_ns()
     base = Ridgeback(URL, clock=lambda: now_ns)

@@ -92,6 +92,12 @@ def test_paper_gains():
         ("emulated", ["frames.base_from_sensor=[[1,0,0],[0,1,0],[0,0,-1]]"], "not a rotation"),
         ("emulated", ["frames.base_from_sensor=[[1,0,0],[0,1,0.001],[0,0,1]]"], "not a rotation"),
         ("emulated", ["limits.max_force_N=151"], "above the ceiling"),
+        ("ur10e-emulated", ["limits.max_force_N=91"], "above 90 N, 0.9 of the range of the sensor's weakest axis"),
+        ("ur10e-emulated", ["limits.max_torque_Nm=9.5"], "above 9 N*m"),
+        ("emulated", ["ft.kind=ur-tool-force"], "`ft.options.model` is missing"),
+        ("ur10e-emulated", ["ft.options.model=UR10"], "UR10 is none: a CB3 arm only estimates forces"),
+        ("ur10e-emulated", ["ft.port=/dev/ttyUSB0"], "`ft.port` is not needed: ur-tool-force is at `arm.host`"),
+        ("ur10e-emulated", ["arm.level=hardware", "arm.host=127.0.0.9"], "`ft.level` must be the arm's, 'hardware'"),
     ],
 )
 def test_contradictions_are_one_sentence(rig, overrides, words):
@@ -99,6 +105,20 @@ def test_contradictions_are_one_sentence(rig, overrides, words):
         resolve_rig(rig, overrides)
     assert words in str(caught.value)
     assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(("model", "range_N"), [("UR3e", 30.0), ("UR5e", 50.0), ("UR10e", 100.0), ("UR16e", 160.0)])
+def test_the_range_of_an_arms_own_sensor_is_its_models(model, range_N):
+    """From the user manuals; the rig's limits then must be within it."""
+    lower = ["limits.max_force_N=25", "limits.slow_force_N=20"]
+    rig = resolve_rig("ur10e-emulated", [f"ft.options.model={model}", *lower])
+    assert rig.ft.declared.range == (range_N,) * 3 + (10.0,) * 3
+    assert rig.ft.declared.rate_hz == 500.0
+
+
+def test_an_arms_own_sensor_is_at_the_arm():
+    rig = resolve_rig("ur10e-emulated", ["ft.level=hardware", "arm.level=hardware", "arm.host=127.0.0.9"])
+    assert rig.ft.port == "127.0.0.9"
 
 
 def test_hardware_and_emulated_mix():

@@ -31,7 +31,8 @@ def refused(host: str, kind: type[Exception]) -> str:
 
 
 def test_a_healthy_controller_is_identified(robot) -> None:
-    info = preflight(robot.host)
+    info, generation = preflight(robot.host)
+    assert generation.rate_hz == 125.0
     assert (info.device, info.where, info.model) == ("ur10", robot.host, "UR10")
     assert (info.version, info.serial) == ("3.15.8.106339", "2015301234")
 
@@ -64,22 +65,30 @@ def test_an_address_that_does_not_answer_at_all() -> None:
     assert "cable" in message
 
 
-@pytest.mark.parametrize("version", [(3, 14, 3, 1), (5, 11, 0, 108249), (3, 2, 0, 0), (4, 15, 0, 0)])
+@pytest.mark.parametrize("version", [(3, 14, 3, 1), (5, 3, 0, 0), (3, 2, 0, 0), (4, 15, 0, 0), (10, 7, 0, 0)])
 def test_other_versions_are_refused_with_both_named(version) -> None:
     with EmulatorProcess(version=version) as emulator:
         message = refused(emulator.host, DeviceProtocolError)
     assert ".".join(map(str, version)) in message
     assert "3.15" in message
+    assert "5.4" in message
 
 
 def test_newer_cb3_is_accepted() -> None:
     with EmulatorProcess(version=(3, 16, 0, 1)) as emulator:
-        assert preflight(emulator.host).version == "3.16.0.1"
+        assert preflight(emulator.host)[0].version == "3.16.0.1"
 
 
-def test_another_model_is_refused() -> None:
-    with EmulatorProcess(model="UR5") as emulator:
-        assert "UR5" in refused(emulator.host, DeviceProtocolError)
+def test_an_unknown_model_is_refused(robot) -> None:
+    robot.call("be_model", "UR20")
+    assert "UR20" in refused(robot.host, DeviceProtocolError)
+    robot.call("be_model", "UR10")
+
+
+def test_another_model_than_the_rig_says_is_refused_with_both_named(robot) -> None:
+    with pytest.raises(DeviceProtocolError, match=r"this is a UR10, not the UR10e"):
+        preflight(robot.host, "UR10e")
+    assert preflight(robot.host, "UR10")[0].model == "UR10"
 
 
 @pytest.mark.parametrize(
@@ -103,7 +112,7 @@ def test_not_running_or_stopped_by_safety(robot, fault, said: str) -> None:
 def test_reduced_mode_is_fine(robot) -> None:
     robot.call("set_safety_mode", 2)
     try:
-        assert preflight(robot.host).model == "UR10"
+        assert preflight(robot.host)[0].model == "UR10"
     finally:
         robot.call("clear_stop")
 

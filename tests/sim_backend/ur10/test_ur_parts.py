@@ -13,8 +13,9 @@ from robot_io.ipc.event_loop import EventLoop
 from robot_io.messages import LinkState
 from sim_backend.sim.ur10 import SimUr10
 from sim_backend.ur10.controller import UrController
-from sim_backend.ur10.emulator import CB3_VERSION, UrEmulator
+from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.ur10.kinematics import flange_pose, rotation_vector
+from sim_backend.ur10.models import BY_NAME, UR10
 from sim_backend.ur10.modes import RobotMode, SafetyMode, joint_mode, robot_status_bits, safety_bits
 from sim_backend.ur10.registers import Registers, Watchdog
 from sim_backend.ur10.request_log import RequestLog
@@ -33,19 +34,48 @@ class MovingArm:
 
 def test_flange_pose_of_the_outstretched_arm() -> None:
     """All joints zero: along -x by both links, out to -y by the wrist, d1 - d5 high; half of it from UR's table."""
-    x, y, z, rx, ry, rz = flange_pose((0.0,) * 6)
+    x, y, z, rx, ry, rz = flange_pose((0.0,) * 6, UR10)
     assert (x, y, z) == pytest.approx((-1.1843, -0.256141, 0.0116))
     assert (rx, ry, rz) == pytest.approx((math.pi / 2, 0.0, 0.0))
 
 
 def test_flange_pose_turns_with_the_base_joint() -> None:
-    x, y, z, *_ = flange_pose((math.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0))
+    x, y, z, *_ = flange_pose((math.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0), UR10)
     assert (x, y, z) == pytest.approx((0.256141, -1.1843, 0.0116))
 
 
 def test_flange_pose_straight_up() -> None:
-    x, y, z, *_ = flange_pose((0.0, -math.pi / 2, 0.0, -math.pi / 2, 0.0, 0.0))
+    x, y, z, *_ = flange_pose((0.0, -math.pi / 2, 0.0, -math.pi / 2, 0.0, 0.0), UR10)
     assert (x, y, z) == pytest.approx((0.0, -0.256141, 0.1273 + 0.612 + 0.5723 + 0.1157))
+
+
+@pytest.mark.parametrize(
+    ("name", "reach_m", "out_m", "up_m"),
+    [
+        ("ur3", 0.24365 + 0.21325, 0.11235 + 0.0819, 0.1519 - 0.08535),
+        ("ur5", 0.425 + 0.39225, 0.10915 + 0.0823, 0.089159 - 0.09465),
+        ("ur3e", 0.24355 + 0.2132, 0.13105 + 0.0921, 0.15185 - 0.08535),
+        ("ur5e", 0.425 + 0.3922, 0.1333 + 0.0996, 0.1625 - 0.0997),
+        ("ur10e", 0.6127 + 0.57155, 0.17415 + 0.11655, 0.1807 - 0.11985),
+        ("ur16e", 0.4784 + 0.36, 0.17415 + 0.11655, 0.1807 - 0.11985),
+    ],
+)
+def test_every_model_outstretched(name: str, reach_m: float, out_m: float, up_m: float) -> None:
+    """From UR's table: both links, then d4 + d6 to the side, d1 - d5 high."""
+    x, y, z, *_ = flange_pose((0.0,) * 6, BY_NAME[name])
+    assert (x, y, z) == pytest.approx((-reach_m, -out_m, up_m))
+
+
+def test_generations() -> None:
+    """125 Hz and PolyScope 3 or 500 Hz and PolyScope 5; only the e-Series has a force sensor."""
+    assert {name for name, model in BY_NAME.items() if model.generation == "CB3"} == {"ur3", "ur5", "ur10"}
+    for model in BY_NAME.values():
+        new = model.name.endswith("e")
+        assert (model.rate_hz, model.version[0], model.force_range_N is not None) == (
+            (500.0, 5, True) if new else (125.0, 3, False)
+        )
+        assert model.dashboard_name == model.name.rstrip("e")
+    assert [BY_NAME[name].force_range_N for name in ("ur3e", "ur5e", "ur10e", "ur16e")] == [30.0, 50.0, 100.0, 160.0]
 
 
 @pytest.mark.parametrize(
@@ -115,7 +145,7 @@ def test_a_flood_of_requests_is_taken_a_little_at_a_time() -> None:
     loop, log = EventLoop(), RequestLog()
     # The port alone: a cycle that is late reads as well, and how many are late depends on the machine.
     host = fresh_address()
-    server = RtdeServer(loop, host, UrController(StillArm(), CB3_VERSION, now_ns=0), log)
+    server = RtdeServer(loop, host, UrController(StillArm(), UR10, now_ns=0), log)
     requests = 0
     with socket.create_connection((host, 30004)) as client:
         client.sendall(b"\x00\x03v" * 20_000)

@@ -1,6 +1,7 @@
 """What is written of an estimate: the fragment, its readings, and what then is left of a hidden error."""
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
@@ -71,3 +72,31 @@ def test_readings_never_replace_another_file(tmp_path, rig):
 def test_nothing_read_leaves_no_file_of_readings(tmp_path, rig):
     assert saved(found(), rig, Raw(), tmp_path / "a.toml", None).readings is None
     assert [path.name for path in tmp_path.iterdir()] == ["a.toml"]
+
+
+def weighed():
+    return Estimate("frame", (0.3,), (0.2,), "deg", (0.1,), "weight of the tool", {}, unseen="yaw")
+
+
+def frame_of(written):
+    return tomllib.loads(written.fragment.read_text())["calibration"]["frame"]
+
+
+def test_a_weight_after_a_cord_keeps_the_cords_date(tmp_path):
+    """The yaw in the rig is still the cord's: as old as that, and measured."""
+    corded = 'calibration.frame={made = 2026-07-01T12:00:00+00:00, uncertainty = 0.5, unit = "deg", source = "a cord"}'
+    frame = frame_of(saved(weighed(), load_rig("emulated", [corded]), None, tmp_path / "frame.toml", None))
+    assert frame["made"] == "2026-07-01T12:00:00Z"
+    assert "unseen" not in frame
+    assert frame["source"] == "weight of the tool; yaw as of 2026-07-01, by a cord"
+
+
+def test_a_weight_alone_or_after_a_weight_leaves_the_yaw_unseen(tmp_path, rig):
+    before = (
+        "calibration.frame={made = 2026-07-01T12:00:00+00:00, uncertainty = 0.5, "
+        'unit = "deg", source = "weight of the tool", unseen = "yaw"}'
+    )
+    for number, told in enumerate((rig, load_rig("emulated", [before]))):
+        frame = frame_of(saved(weighed(), told, None, tmp_path / f"{number}.toml", None))
+        assert frame["unseen"] == "yaw"
+        assert frame["made"] != "2026-07-01T12:00:00Z"

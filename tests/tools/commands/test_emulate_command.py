@@ -18,6 +18,8 @@ import pytest
 import serial
 import websocket
 
+from robot_io.ur10.tool_force import UrToolForce
+from tests.wire.ur_process import wait_until
 from tools import cli
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -46,6 +48,17 @@ def read_line(child, within_s=20.0):
         assert byte, child.stderr.read().decode()
         line += byte
     return line
+
+
+@pytest.mark.parametrize("device", ["ft300", "ridgeback"])
+def test_the_help_says_what_is_modelled_and_what_is_not(device, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["emulate", device, "--help"])
+    assert ended.value.code == 0
+    told = capsys.readouterr().out
+    assert "\nmodelled: " in told
+    assert "\nnot modelled: " in told
+    assert max(map(len, told.splitlines())) <= 80
 
 
 def registers_of(port):
@@ -78,6 +91,22 @@ def rtde_version_accepted(host):
     with socket.create_connection((host, 30004), timeout=5.0) as client:
         client.sendall(bytes.fromhex("0005560002"))
         return client.recv(16) == bytes.fromhex("00045601")
+
+
+def test_every_model_of_a_ur(tmp_path):
+    """One that is not named is the UR10; one with an e has a sensor, which the driver reads."""
+    with emulate("ur", "--host", "127.0.42.11") as (_, ur10):
+        assert ur10 == [{"device": "ur10", "host": "127.0.42.11"}]
+    arguments = ("ur", "--model", "UR5e", "--host", "127.0.42.12", "--wrench=0,0,-15,0,0,0")
+    with emulate(*arguments) as (_, ur5e), UrToolForce("127.0.42.12", model="UR5e") as sensor:
+        assert ur5e == [{"device": "ur5e", "host": "127.0.42.12"}]
+        assert wait_until(sensor.drain, "a reading")[-1].value.fz == -15.0
+
+
+def test_a_cb3_arm_has_no_sensor_to_feed():
+    done = subprocess.run([*PUSH, "ur", "--model", "ur5", "--wrench=1,0,0,0,0,0"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "a UR5 has no force sensor" in done.stderr
 
 
 def test_two_robots_side_by_side():

@@ -149,11 +149,11 @@ def test_an_address_that_is_no_port(state, tmp_path):
 
 
 def test_wrong_robot_version(state, tmp_path):
-    with UrProcess(version=(5, 11, 0, 108249)) as robot:
+    with UrProcess(version=(5, 3, 0, 1)) as robot:
         error = push_fails(
             state, tmp_path, 4, mixed(tmp_path, "arm", f'host = "{robot.host}"'), "--move-robot", also_plain=False
         )
-        assert "5.11" in error["what"]
+        assert "5.3" in error["what"]
         assert "3.15" in error["what"]
         assert error["where"] == f"ur10 {robot.host}"
 

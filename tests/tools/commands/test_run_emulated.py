@@ -255,6 +255,20 @@ def test_a_barrel_is_pushed_with_stdin_closed(state, tmp_path, host):
     assert summary["distance_m"] >= 0.15
 
 
+@pytest.mark.long
+@repeated_when_the_host_stalls
+def test_an_e_series_arm_pushes_with_its_own_sensor(state, tmp_path, host):
+    """To the end, without a fault, and its log replays tick by tick."""
+    argv = ("run", "ur10e-emulated", "--distance-m", "0.3", *QUICK, "--out", str(tmp_path / "run"), "--json")
+    ended = finished(state, *argv, host=host)
+    assert ended.code == 0, ended.err
+    summary = ended.last_object
+    assert (summary["verdict"], summary["fault_counts"]) == ("done", {})
+    assert summary["devices"]["tool-force"]["packets_ok"] > 500 * 5
+    replayed = finished(state, "replay", str(tmp_path / "run"), "--json", host=host)
+    assert replayed.code == 0, replayed.err
+
+
 class Terminal:
     """Our end of a terminal, read without waiting."""
 

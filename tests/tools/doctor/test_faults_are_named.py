@@ -43,7 +43,7 @@ ARM = [
     (["arm.off"], "arm.ports", "failed"),
     (["arm.dashboard-silent"], "arm.ports", "failed"),
     (["arm.truncated=20"], "arm.ports", "failed"),
-    (["arm.version=5.11"], "arm.version", "failed"),
+    (["arm.version=10.07"], "arm.version", "failed"),
     (["arm.version=3.14"], "arm.version", "failed"),
     (["arm.other-model"], "arm.version", "failed"),
     (["arm.protective-stop at 0 s"], "arm.safety", "failed"),
@@ -67,6 +67,8 @@ BASE = [
     (["base.lag=0.2"], "base.round-trip", "warning"),
     (["base.lag=0.4"], "base.round-trip", "failed"),
     (["base.no-rosapi"], "base.command-type", "warning"),
+    (["base.cold=1.5"], "base.command-type", "ok"),
+    (["base.slow-answers=0.2"], "base.round-trip", "warning"),
     (["base.command-type"], "base.command-type", "failed"),
     (["base.no-listener"], "base.command-listener", "failed"),
     (["base.command.ignored at 0 s"], "base.command-listener", "failed"),
@@ -101,7 +103,7 @@ NOT_AT_REST = {
 }  # fmt: skip
 
 
-QUICK = {"arm.silent", "arm.version=5.11", "arm.protective-stop at 0 s", "arm.turned", "arm.inputs-taken"}
+QUICK = {"arm.silent", "arm.version=10.07", "arm.protective-stop at 0 s", "arm.turned", "arm.inputs-taken"}
 
 
 def table(rows):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from robot_io.errors import EnvironmentFault
-from tools.places.device_locks import DeviceLocks, resources_of
+from tools.places.device_locks import DeviceLocks, FreeDevices, resources_of
 from tools.places.state_dir import state_dir
 from tools.rig import resolve_rig
 
@@ -142,3 +142,12 @@ def test_a_lock_that_cannot_be_opened_is_said():
     lock.mkdir()
     with pytest.raises(EnvironmentFault, match=r"\.lock: the device's lock cannot be opened"):
         DeviceLocks(rig("a", arm="127.0.0.77"))
+
+
+def test_an_arm_and_its_own_sensor_have_one_lock():
+    levels = ["ft.level=hardware", "arm.level=hardware", "arm.host=127.0.0.9"]
+    own = resolve_rig("ur10e-emulated", levels)
+    assert len({found.key for found in resources_of(own)}) == 1
+    assert "127.0.0.9" in str(refused(own, rig("arm-only", arm="127.0.0.9")))
+    with DeviceLocks(rig("arm-only", arm="127.0.0.9")), FreeDevices(own) as free:
+        assert set(free.held) == {"ft", "arm"}

@@ -140,3 +140,7 @@ def test_a_comparison_opens_on_desktop_and_phone(page, runs, tmp_path):
     for width in (1280, 390):
         page.open(tmp_path / "out" / "compare.html", width=width)
         assert page.value("document.documentElement.scrollWidth") <= width
+    assert page.value("[...document.querySelectorAll('.wide')].filter(t => t.scrollWidth > t.clientWidth).length") == 0
+    # On the phone each number has its name beside it, since the row of names is not above it.
+    shown = page.value("getComputedStyle(document.querySelectorAll('.results td')[3], '::before').content")
+    assert shown == '"distance (m)"'

@@ -11,7 +11,9 @@ from robot_io.clock import monotonic_ns
 from robot_io.errors import ConfigError
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.rig.config import load_rig
+from sim_backend.ur10.emulator import UrEmulator
 from sim_backend.world.world import World
+from tools.rig import resolve_rig
 from tools.run.emulated.emulators import addresses_of, open_emulators
 
 
@@ -33,6 +35,20 @@ def test_each_device_is_reached_at_an_address_of_its_own(loop):
         assert addresses["ft"].startswith("/dev/pts/")
         assert addresses["arm"].startswith("127.0.0.")
         assert addresses["base"].startswith("ws://127.0.0.1:")
+    finally:
+        for emulator in opened.values():
+            emulator.close()
+
+
+def test_an_arms_own_sensor_is_the_arms_emulator(loop):
+    rig = resolve_rig("ur10e-emulated")
+    opened = open_emulators(loop, World(rig, 0, monotonic_ns()), rig, ("ft", "arm", "base"), "")
+    try:
+        addresses = addresses_of(opened)
+        assert addresses["ft"] == addresses["arm"]
+        arm = opened["arm"]
+        assert isinstance(arm, UrEmulator)
+        assert arm.controller.model.name == "UR10e"
     finally:
         for emulator in opened.values():
             emulator.close()

@@ -6,7 +6,7 @@ import pytest
 
 from robot_io.geometry import StraightPath
 from tools.rig import resolve_rig
-from tools.watch.ball_force import ball_force, direction, drawing, mean_force
+from tools.watch.ball_force import ball_force, direction, drawing, mean
 
 AHEAD = StraightPath.of((0.0, 0.0), 0.0)
 LEFTWARDS = StraightPath.of((0.0, 0.0), 90.0)
@@ -102,4 +102,4 @@ def test_the_drawing_has_its_tip_where_the_force_points(body, row, column):
 
 
 def test_the_mean_is_taken_axis_by_axis():
-    assert mean_force([(1.0, 2.0, 3.0), (3.0, 6.0, -3.0)]) == (2.0, 4.0, 0.0)
+    assert mean([(1.0, 2.0, 3.0), (3.0, 6.0, -3.0)]) == (2.0, 4.0, 0.0)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import struct
 
 import msgspec
 import pytest
@@ -21,6 +22,7 @@ from robot_io.messages import (
 )
 from safety.faults import FAULTS
 from tools.rig import resolve_rig
+from tools.watch.live_topics import LiveTopics
 from tools.watch.reports import DeviceReport
 from tools.watch.screen import one_line, picture
 from tools.watch.seen import Seen, Stage
@@ -207,3 +209,33 @@ def test_reports_survive_their_way():
     reader.close()
     sender.send(sent)
     far.close()
+
+
+class Kept:
+    """Takes the place of a viewer's feed."""
+
+    def __init__(self):
+        self.payloads = {}
+
+    def add(self, topic, _log_time_ns, payload):
+        self.payloads[topic] = payload
+
+    def flush(self):
+        pass
+
+
+def test_the_live_wrench_has_the_torque_about_the_sensor():
+    """A moment of 2 N*m about the sensor's z, the base turned by 90 degrees: -R_z(90) base_from_sensor (0, 0, 2)."""
+    seen = Seen(resolve_rig("emulated"))
+    seen.take_device(DeviceReport("ft", "up", ft=wrenches(120, 2000, 0, 0.0)))
+    seen.take_device(DeviceReport("base", "up", base=(stamped(BasePose(Pose2D(-0.5, 0.0, math.pi / 2)), 1, 1),)))
+    turned = tuple(stamped(SensorWrench(*BIAS, 0.0, 0.0, 2.0), 300 + i, 250 - 10 * i) for i in range(25))
+    seen.take_device(DeviceReport("ft", "up", ft=turned))
+    view = view_of(seen, "test", NOW_NS)
+    x, y, z = (row[2] for row in seen.rig.frames.base_from_sensor)
+    expected = (2.0 * y, -2.0 * x, -2.0 * z)
+    assert view.torque_on_object == pytest.approx(expected, abs=0.02)
+    feed = Kept()
+    LiveTopics(seen.rig, feed).show(view)
+    assert struct.unpack("<3d", feed.payloads["/ft/wrench"][-24:]) == pytest.approx(expected, abs=0.02)
+    assert b"ft_sensor_world" in feed.payloads["/ft/wrench"]

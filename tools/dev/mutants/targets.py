@@ -33,7 +33,9 @@ WHOLE = (
     "robot_io/log/seal.py",
     "robot_io/ridgeback/rosbridge_codec.py",
     "robot_io/ridgeback/rosbridge_messages.py",
+    "robot_io/ur10/generation.py",
     "robot_io/ur10/state.py",
+    "robot_io/ur10/tool_packets.py",
 )
 """Globs of the parts without a process: every mutant of them is tested, except for the shells below."""
 

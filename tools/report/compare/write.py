@@ -68,7 +68,7 @@ def page(runs: Sequence[ComparedRun], results: Sequence[Result], picture: str) -
     counted = Counter(row.verdict for row in results)
     differing = differing_settings([one.run for one in runs])
     numbers = [str(one.number) for one in runs]
-    settings = table(("setting", *numbers), [(name, *values) for name, values in differing.items()])
+    settings = table(("setting", *numbers), [(name, *values) for name, values in differing.items()], stacked=True)
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         content_policy=content_policy(),
         style=style_sheet(),
@@ -93,7 +93,7 @@ def alt_text(results: Sequence[Result]) -> str:
 
 def _results(runs: Sequence[ComparedRun], results: Sequence[Result]) -> str:
     """Return the table, each run's number in the colour of its line."""
-    text = table(HEADS, [as_cells(row) for row in results])
+    text = table(HEADS, [as_cells(row) for row in results], stacked=True)
     for one in runs:
         colour = line_of(one).colour
         swatch = f'<i class="swatch" style="background:var(--c{colour[1:].lower()}, {colour})"></i>'

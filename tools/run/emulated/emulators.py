@@ -11,15 +11,17 @@ from robot_io.errors import EnvironmentFault
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.kinds import find_kind
 from robot_io.rig.config import RigConfig
+from robot_io.rig.declared import TOOL_FORCE
 from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.ridgeback.emulator import RosbridgeEmulator
 from sim_backend.ridgeback.settings import ridgeback_settings
 from sim_backend.ur10.emulator import UrEmulator
+from sim_backend.ur10.models import BY_NAME
 from sim_backend.world.world import World
 from tools.rig import kinds_of
 
 ARM_HOSTS = tuple(f"127.0.0.{last}" for last in range(10, 250))
-"""A UR10's ports are fixed, so each emulated arm needs its own loopback address."""
+"""A UR's ports are fixed, so each emulated arm needs its own loopback address."""
 
 
 class Emulator(Protocol):
@@ -44,15 +46,28 @@ def open_ft300(loop: EventLoop, world: World, rig: RigConfig) -> Ft300Emulator:
 
 
 def open_ur10(loop: EventLoop, world: World, rig: RigConfig, hosts: tuple[str, ...] = ARM_HOSTS) -> UrEmulator:
-    """Open a UR10 on the first loopback address whose ports are free. Raises EnvironmentFault if none is."""
+    """Open the world's UR on the first loopback address whose ports are free. Raises EnvironmentFault if none is.
+
+    Its own sensor feels the world where it is the rig's sensor.
+    """
+    model = BY_NAME[rig.world.arm_model.lower()]
+    wrench = world if rig.ft.kind == TOOL_FORCE else None
     for host in hosts:
         try:
-            return UrEmulator(loop, world, host=host, rate_hz=rig.world.arm_rate_hz, phase=rig.world.arm_phase)
+            return UrEmulator(
+                loop,
+                world,
+                host=host,
+                model=model,
+                rate_hz=rig.world.arm_cycle_hz,
+                phase=rig.world.arm_phase,
+                wrench=wrench,
+            )
         except EnvironmentFault:
             if len(hosts) == 1:
                 raise
     raise EnvironmentFault(
-        "no loopback address is free for an emulated UR10",
+        "no loopback address is free for an emulated UR",
         where=f"{hosts[0]} to {hosts[-1]}",
         do="Stop other emulators",
     )
@@ -114,7 +129,10 @@ def open_emulators(
     """Open the emulator of each device. Raises as `open_emulator`, and then none is left open."""
     opened: dict[str, Emulator] = {}
     with contextlib.ExitStack() as opening:
-        for device in devices:
+        for device in sorted(devices, key=lambda name: name != "arm"):
+            if device == "ft" and rig.ft.kind == TOOL_FORCE:
+                opened["ft"] = opened["arm"]  # one controller, one address
+                continue
             opened[device] = open_emulator(loop, world, rig, device, folder)
             opening.callback(opened[device].close)
         opening.pop_all()
@@ -126,7 +144,7 @@ def endpoint(emulator: Emulator) -> dict[str, str]:
     if isinstance(emulator, Ft300Emulator):
         return {"device": "ft300", "port": emulator.port}
     if isinstance(emulator, UrEmulator):
-        return {"device": "ur10", "host": emulator.host}
+        return {"device": emulator.controller.model.name.lower(), "host": emulator.host}
     if isinstance(emulator, ExternalEmulator):
         return {"device": "own", "address": emulator.address}
     assert isinstance(emulator, RosbridgeEmulator)
