@@ -91,9 +91,8 @@ class Floor:
         if effects.turning == "coulomb":
             from sim_backend.physics.coulomb.floor import CoulombFloor  # numba takes long to load: only on request
 
-            leaning_to = None if _near(model.cof_m, model.shape.centroid_m) else model.cof_m
-            own = support_points(model.shape, pressure, points, leaning_to if isinstance(pressure, str) else None)
-            self.coulomb = CoulombFloor(own, effects.shift_m, field)
+            own = support_points(model.shape, pressure, points)
+            self.coulomb = CoulombFloor(own, model.cof_m, effects.shift_m, field)
         elif field is not None:
             sampled = model.shape.rim_points() if pressure == "rim" else model.shape.grid_points(SUPPORT_ACROSS)
             self._patches = _Patches(model, sampled, field)
@@ -193,10 +192,6 @@ def _pressure_moment(shape: Shape, pressure: Pressure) -> Moment:
         sum(w * (x - x0) * (y - y0) for x, y, w in points),
         sum(w * (y - y0) ** 2 for _, y, w in points),
     )
-
-
-def _near(one: Point, other: Point) -> bool:
-    return hypot(one[0] - other[0], one[1] - other[1]) < 1e-12
 
 
 def _room(shape: Shape, cof: Point) -> float:

@@ -61,9 +61,9 @@ def centre_of(points: Sequence[SupportPoint]) -> Point:
     return (fsum(w * x for x, _, w in points), fsum(w * y for _, y, w in points))
 
 
-def room_of(points: Sequence[SupportPoint]) -> float:
-    """Return how far the pressure's centre can move in any direction before the slider tips over (m)."""
-    x0, y0 = centre_of(points)
+def room_of(points: Sequence[SupportPoint], centre_m: Point) -> float:
+    """Return how far the pressure's centre can move from here in any direction before the slider tips over (m)."""
+    x0, y0 = centre_m
     room = inf
     for ax, ay, _ in points:
         for bx, by, _ in points:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from robot_io.errors import ConfigError
 from sim_backend.physics.coulomb.contact import CoulombContact
 from sim_backend.physics.floor_patches import FrictionField
+from sim_backend.physics.shapes import Point
 from sim_backend.physics.support import SupportPoint, room_of
 
 LOOK_AGAIN_M = 0.002
@@ -16,19 +17,23 @@ LOOK_AGAIN_M = 0.002
 class CoulombFloor:
     """Keeps the loads of a `CoulombContact` up to date.
 
-    points: where the slider stands (BODY frame). shift_m: how far the pressure's centre runs ahead along the push.
-    field: a floor of patches, None on an even one. Raises ConfigError for a slider that tips over.
+    points: where the slider stands (BODY frame). load_m: where its load's centre is. shift_m: how far the pressure's
+    centre runs ahead of that along the push. field: a floor of patches, None on an even one. Raises ConfigError for a
+    slider that tips over.
     """
 
-    def __init__(self, points: Sequence[SupportPoint], shift_m: float, field: FrictionField | None) -> None:
+    def __init__(
+        self, points: Sequence[SupportPoint], load_m: Point, shift_m: float, field: FrictionField | None
+    ) -> None:
         self.contact = CoulombContact(points)
         self.centre_m = self.contact.centre_m
-        if shift_m >= room_of(points):
+        if shift_m >= room_of(points, load_m):
             raise ConfigError(
                 f"a slider on these support points, whose pressure moves {shift_m:.3g} m ahead, tips over",
                 where="slider",
                 do="Push lower, lower the floor's friction, or spread the pressure",
             )
+        self._off_x, self._off_y = load_m[0] - self.centre_m[0], load_m[1] - self.centre_m[1]
         self._shift_m, self._field = shift_m, field
         self._reach = max(abs(x) + abs(y) for x, y, _ in points)
         self._seen: tuple[float, float, float, float] | None = None
@@ -38,7 +43,8 @@ class CoulombFloor:
         """Load the points for a pose (m; cosine, sine of the heading) and the direction of the push (BODY)."""
         if self._field is not None:
             self._look(self._field, x, y, cos_, sin_)
-        self.contact.load((self._shift_m * push_x, self._shift_m * push_y), self._friction)
+        ahead = self._shift_m
+        self.contact.load((self._off_x + ahead * push_x, self._off_y + ahead * push_y), self._friction)
 
     def _look(self, field: FrictionField, x: float, y: float, cos_: float, sin_: float) -> None:
         if self._seen is not None:
