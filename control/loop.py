@@ -16,9 +16,9 @@ from msgspec.structs import replace
 
 from control.ft_input import ft_input
 from control.notes.run_notes import RunNotes
-from control.pacer import spin_until, wake
-from control.silence import Silence
-from control.timing import LoopTiming
+from control.pace.pacer import spin_until, wake
+from control.pace.silence import Silence
+from control.pace.timing import LoopTiming
 from robot_io.clock import ClockNs, asleep_ns, monotonic_ns
 from robot_io.ipc.event_loop import EventLoop, Timer
 from robot_io.ipc.gate_link import GateLink

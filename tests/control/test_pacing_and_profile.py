@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.pacer import spin_until, wake
+from control.pace.pacer import spin_until, wake
+from control.pace.timing import LoopTiming
 from control.speed_profile import CREEP_M_PER_S, approach_speed, push_speed
-from control.timing import LoopTiming
 
 MS = 1_000_000
 

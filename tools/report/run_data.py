@@ -13,7 +13,7 @@ from mcap.records import Attachment, Message, Metadata
 from robot_io.cdr.cdr_type import CdrType
 from robot_io.clock import NS_PER_S
 from robot_io.errors import LogDamaged, PushError
-from robot_io.geometry import StraightPath, wrap_angle, yaw_from_quaternion
+from robot_io.geometry import StraightPath, yaw_from_quaternion
 from robot_io.log.log_format import format_of
 from robot_io.log.logged_type import LoggedType
 from robot_io.log.messages import LOOP_TIMING, SAFETY_EVENT, SafetyEvent
@@ -25,30 +25,11 @@ from robot_io.mcap.log_file import RUN_METADATA
 from robot_io.mcap.walk import Grown, Topic, walk
 from robot_io.rig.config import RigConfig
 from robot_io.rig.logged import rig_of_log
-from robot_io.tick import TICK_CDR, ControlTick, Phase
+from robot_io.tick import TICK_CDR, ControlTick
 from tools.report.bounded_series import Floats, Series, Span, Spans, Tally
+from tools.report.tick_row import TICK_COLUMNS, tick_row
 
 MOST_SKIPS = 5000
-
-TICK_COLUMNS = (
-    "t_s",
-    "along_m",
-    "lateral_m",
-    "force_x",
-    "force_y",
-    "force_raw",
-    "theta_f",
-    "theta_p",
-    "speed_wanted",
-    "speed_command",
-    "speed_measured",
-    "heading_error",
-    "phase",
-)
-"""One row per tick; forces in N and angles in rad in the PATH frame, speeds in m/s, heading error in rad.
-
-`along_m` is from the path's origin. `force_raw` is the magnitude of the newest reading minus bias, as safety uses it.
-"""
 SLIDER_COLUMNS = ("t_s", "x_m", "y_m", "yaw_rad")
 READ: dict[str, CdrType[Any]] = {
     "/control/tick": TICK_CDR,
@@ -241,7 +222,7 @@ class _Reader:
             self._first = tick
             self._first_tick_s = time_s
             self._modes.begin("", str(tick.after.safety.mode), "", time_s)
-        self._ticks.add(self._row(tick, time_s))
+        self._ticks.add(tick_row(tick, self._path_frame, time_s))
         if tick.input.ft.readings:
             self._last_reading_ns = tick.input.ft.readings[-1].received_ns
         now_ns = tick.input.now_ns
@@ -252,30 +233,6 @@ class _Reader:
         ):
             if at_ns:
                 self._ages[device].add((now_ns - at_ns) * 1e-6)
-
-    def _row(self, tick: ControlTick, time_s: float) -> tuple[float, ...]:
-        control, output, base = tick.after.control, tick.output, tick.input.base
-        path = self._path_frame
-        raw = math.nan
-        if control.tared and tick.input.ft.readings:
-            raw = math.dist(tick.input.ft.readings[-1].force, control.bias_force)
-        driven = control.phase in (Phase.PUSH, Phase.LOST) and control.force_valid
-        turned = base.pose.yaw - control.held_yaw
-        held = control.phase >= Phase.APPROACH and math.isfinite(turned)
-        return (
-            time_s,
-            path.along(output.contact_x, output.contact_y),
-            path.lateral(output.contact_x, output.contact_y),
-            *path.vector_to_path(*control.force_world[:2]),
-            raw,
-            control.theta_f if driven and control.phase == Phase.PUSH else math.nan,
-            control.theta_p if driven else math.nan,
-            math.hypot(output.wanted_body.vx, output.wanted_body.vy),
-            math.hypot(output.command_body.vx, output.command_body.vy),
-            math.hypot(base.odometry.vx, base.odometry.vy),
-            wrap_angle(turned) if held else math.nan,
-            float(control.phase),
-        )
 
     def _event(self, time_s: float, event: SafetyEvent) -> None:
         if event.kind == "mode":

@@ -31,6 +31,8 @@ DIMENSIONLESS = {
     "patch_strength": "a part of the mean",
     "pressure": "a name, or points in m, m and a share",
     "support_points": "a number of points",
+    "cpu": "the number of a processor",
+    "impratio": "a ratio",
     "base_from_sensor": "a rotation matrix",
     "base_from_marker": "m, m, rad: in the docstring",
     "marker_offset": "m, m, rad: in the docstring",
@@ -44,7 +46,7 @@ DIMENSIONLESS = {
     "residual": "in `unit`",
 }
 SUFFIXES = (
-    *("_m", "_s", "_ms", "_days", "_N", "_Nm", "_rad", "_deg", "_hz", "_kg", "_m_per_s", "_rad_per_s"),
+    *("_m", "_s", "_ms", "_us", "_minutes", "_MB", "_days", "_N", "_Nm", "_rad", "_deg", "_hz", "_kg", "_m_per_s", "_rad_per_s"),
     *("_m_per_s2", "_rad_per_s2", "_per_s", "_rad_per_m"),
 )
 

@@ -11,7 +11,7 @@ import sys
 
 import msgspec
 
-from control.pacer import spin_until, wake
+from control.pace.pacer import spin_until, wake
 from robot_io.clock import NS_PER_S, monotonic_ns
 from robot_io.errors import EnvironmentFault
 from robot_io.ipc.event_loop import EventLoop

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from robot_io.errors import EnvironmentFault
 from robot_io.ipc.realtime import NO_CPU
-from robot_io.log.messages import LOOP_TIMING
+from robot_io.log.signals import SIGNALS
 from robot_io.mcap.read import read_log
 from tools.bench.clock.wakeups import Wakeups
 
@@ -51,12 +51,12 @@ def _read(out: Path, stderr: str) -> Wakeups:
     try:
         loop = json.loads((out / "summary.json").read_text())["loop"]
         late = [
-            LOOP_TIMING.decode(message.payload).late_ns
+            SIGNALS.decode(message.payload).wake_late_us
             for message in read_log(out / "run.mcap")
-            if message.topic == "/loop/timing"
+            if message.topic == "/control/signals"
         ]
     except (OSError, KeyError):
         late, loop = [], {}
     if not late:
         raise EnvironmentFault(f"the run failed: {stderr.strip()[-300:]}", where="push bench loop")
-    return Wakeups(tuple(sorted(ns * 1e-3 for ns in late)), int(loop["skipped"]), loop)
+    return Wakeups(tuple(sorted(late)), int(loop["skipped"]), loop)

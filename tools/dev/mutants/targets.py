@@ -19,6 +19,7 @@ WHOLE = (
     "control/*.py",
     "control/laws/*.py",
     "control/notes/*.py",
+    "control/pace/*.py",
     "safety/*.py",
     "safety/checks/*.py",
     "robot_io/geometry.py",
