@@ -16,7 +16,7 @@ from robot_io.errors import ConfigError
 from robot_io.messages import Pose2D
 from sim_backend.physics.contact_geometry import Nearest, Outline
 from sim_backend.physics.contact_outcome import FREE, ContactMode, ContactOutcome
-from sim_backend.physics.corner import CornerArguments, solve_at_corner
+from sim_backend.physics.corner import solve_at_corner
 from sim_backend.physics.floor import Floor
 from sim_backend.physics.slider import SliderModel
 from sim_backend.physics.slider_exact import SEPARATING, ContactSolution, ContactSolver, Grain, Moving, solve_exact
@@ -28,6 +28,8 @@ TOUCH_M = 1e-9
 LONGEST_PIECE_M = 1e-3
 """Longer motions of the ball are cut into pieces of at most this: the result does not depend on the caller's step."""
 MOST_PIECES = 1000
+FIRST_TURNS, LATER_TURNS = 12, 2
+"""How often the push is found anew with the grip it causes: at a first touch there is no earlier one to begin with."""
 REST_M_PER_S = 1e-9
 """Below this speed the ball counts as at rest and the force is held."""
 SMALLEST_BALL_M = 1e-3
@@ -66,6 +68,7 @@ class PushedSlider:
         self._grain: Grain | None = None
         self._floor = floor
         self._push_x = self._push_y = 0.0  # direction of the push force, BODY
+        self._new = True  # no push of a step before
         self.x_m, self.y_m, self.heading_rad = pose
         self._cos, self._sin = cos(self.heading_rad), sin(self.heading_rad)
         self._ball = (float("nan"), float("nan"))
@@ -152,7 +155,9 @@ class PushedSlider:
         floor = self._floor
         solution: ContactSolution = SEPARATING
         # the floor's grip depends on the push, and the push on the grip: last step's push is only an initial guess
-        for _ in range(2 if floor is not None and floor.follows_push else 1):
+        turns = FIRST_TURNS if self._new else LATER_TURNS
+        self._new = False
+        for _ in range(turns if floor is not None and floor.follows_push else 1):
             if floor is not None:
                 self._update_grip(floor)
             solution = self._solve_contact(vx, vy)
@@ -165,12 +170,11 @@ class PushedSlider:
 
     def _solve_contact(self, vx: float, vy: float) -> ContactSolution:
         """Solve the current contact, on a face or at a corner."""
+        x, y = self._cx - self._cof_x, self._cy - self._cof_y
         if self._corner < 0:
-            return self._solve(
-                self._cx - self._cof_x, self._cy - self._cof_y, self._nx, self._ny, vx, vy,
-                self._d, self._f_max, self._mu, self._grain,
-            )  # fmt: skip
-        choice = solve_at_corner(self._outline.rows, self._corner, self._solve, vx, vy, self._arguments())
+            return self._solve(x, y, self._nx, self._ny, vx, vy, self._d, self._f_max, self._mu, self._grain)
+        arguments = (x, y, self._d, self._f_max, self._mu, self._grain)
+        choice = solve_at_corner(self._outline.rows, self._corner, self._solve, vx, vy, arguments)
         if choice is None:
             return SEPARATING
         solution, self._nx, self._ny, self._face = choice
@@ -196,6 +200,7 @@ class PushedSlider:
     def _set_contact(self, nearest: Nearest) -> None:
         _, self._nx, self._ny, self._cx, self._cy, self._face = nearest
         self._push_x, self._push_y = self._nx, self._ny
+        self._new = True
         self._corner = -1
         if self._point_on_polygon:
             for corner, row in enumerate(self._outline.rows):
@@ -280,10 +285,6 @@ class PushedSlider:
             c * self._nx - s * self._ny,
             s * self._nx + c * self._ny,
         )
-
-    def _arguments(self) -> CornerArguments:
-        """Contact minus centre of friction (BODY), and the floor's grip on the slider."""
-        return (self._cx - self._cof_x, self._cy - self._cof_y, self._d, self._f_max, self._mu, self._grain)
 
     def _to_body(self, x: float, y: float) -> tuple[float, float]:
         dx, dy = x - self.x_m, y - self.y_m

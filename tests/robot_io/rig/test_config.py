@@ -46,8 +46,8 @@ DIMENSIONLESS = {
     "residual": "in `unit`",
 }
 SUFFIXES = (
-    *("_m", "_s", "_ms", "_us", "_minutes", "_MB", "_days", "_N", "_Nm", "_rad", "_deg", "_hz", "_kg", "_m_per_s", "_rad_per_s"),
-    *("_m_per_s2", "_rad_per_s2", "_per_s", "_rad_per_m"),
+    *("_m", "_s", "_ms", "_us", "_minutes", "_days", "_N", "_Nm", "_rad", "_deg", "_hz", "_kg", "_MB"),
+    *("_m_per_s", "_rad_per_s", "_m_per_s2", "_rad_per_s2", "_per_s", "_rad_per_m"),
 )
 
 
