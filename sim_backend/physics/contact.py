@@ -125,12 +125,9 @@ class PushedSlider:
         vx, vy = (to_x - x) / dt_s, (to_y - y) / dt_s
         if hypot(vx, vy) < REST_M_PER_S:
             return self._outcome_at_rest()
-        done = 0.0
-        if not self._touching:
-            touch = self._first_touch(x, y, to_x - x, to_y - y)
-            if touch is None:
-                return FREE
-            done = touch
+        done = 0.0 if self._touching else self._first_touch(x, y, to_x - x, to_y - y)
+        if done is None:
+            return FREE
         outcome = FREE
         for _ in range(4):  # each turn after the first starts at a corner a point pusher has slid to
             left = (1.0 - done) * dt_s

@@ -149,7 +149,7 @@ def test_of_a_world_without_cameras_the_object_s_pose_is_derived(tmp_path, capsy
     code, told = first_of(log, capsys)
     assert code == 0
     for topic in ("/slider/pose", "/tf"):
-        edited = resealed(log, tmp_path / f"{topic[1:3]}.mcap", changed(topic, 100, last_byte))
+        edited = resealed(log, tmp_path / f"{topic[1:3]}.mcap", changed(topic, 20, last_byte))
         code, edited_told = first_of(edited, capsys)
         assert code == DIFFERS
         assert edited_told["messages"] == told["messages"]

@@ -22,7 +22,8 @@ LANE_SOURCES = tuple(
     ROOT / f"{name}.py"
     for name in (
         "sim_backend/physics/batch", "sim_backend/physics/lanes", "sim_backend/physics/shapes",
-        "sim_backend/physics/slider", "sim_backend/physics/slider_exact", "tools/sweep/grid", "tools/sweep/items",
+        "sim_backend/physics/slider", "sim_backend/physics/slider_exact", "sim_backend/physics/support",
+        "tools/sweep/grid", "tools/sweep/items",
     )
 )  # fmt: skip
 

@@ -104,7 +104,7 @@ def test_a_stop_names_its_first_cause_with_number_and_limit(tmp_path):
     assert first["value"] > 14.0
     event = next(event for event in summary["safety_events"] if "F50-stop" in event["faults"])
     assert first["at_s"] == pytest.approx(event["t_s"], abs=0.001)
-    words = f"F50-stop the force is above the limit: {first['value']:.3g} N at {first['at_s']:.1f} s, limit 14 N"
+    words = f"F50-stop the force is above the limit: {first['value']:.4g} N at {first['at_s']:.1f} s, limit 14 N"
     assert words in said
     assert words in (tmp_path / "run" / "report.html").read_text()
 

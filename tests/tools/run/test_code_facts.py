@@ -92,7 +92,7 @@ def test_a_git_that_hangs_fails_or_is_missing_costs_at_most_a_moment(script, che
 def test_versions_are_those_installed_and_a_missing_package_is_left_out(monkeypatch):
     code_facts.code_facts.cache_clear()
     facts = code_facts.code_facts()
-    assert facts["format"] == "4"
+    assert facts["format"] == "5"
     assert facts["program"] == "single-point-push 0.1.0"
     for name in ("numpy", "mcap", "msgspec", "ur-rtde"):
         assert facts[name] == importlib.metadata.version(name)
