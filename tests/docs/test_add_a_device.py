@@ -56,6 +56,7 @@ def test_a_push_with_the_pages_sensor_replays_exactly(push, folder, tmp_path):
     assert replay.last_object["ticks"] == replay.last_object["identical"] == summary["loop"]["ticks"]
 
 
+@pytest.mark.long
 def test_the_same_sensor_at_level_sim(push, folder, tmp_path):
     done = push(
         folder, "run", "sim", "--fast", "--set", f"ft.kind={KIND}", "--distance-m", "0.3",

@@ -95,7 +95,8 @@ def readme_commands():
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("shortened", [True, pytest.param(False, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("shortened", [True, False])
 @repeated_when_the_host_stalls
 def test_readme_shell_blocks_run(tmp_path, shortened):
     """Every command of the README in order, in an empty folder; make targets are looked up, not run again.

@@ -73,6 +73,8 @@ NEWER = {
     "control.sideways_m",
 }
 """Fields of a tick that these logs do not hold."""
+ALWAYS = ("sim", "sim-format-4-whole")
+MOST_IN_LONG = [name if name in ALWAYS else pytest.param(name, marks=pytest.mark.long) for name in WHOLE]
 CUT_OFF = LOGS / "emulated-cut-off.mcap"
 SAVED = Golden(5014, 352, 427, (), 30)
 """What could be saved of it when it was written."""
@@ -130,14 +132,14 @@ def test_info_tells_what_is_in_it(name, capsys):
     assert info["metadata"]["run"]["level"] == name.partition("-")[0]
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", MOST_IN_LONG)
 def test_cat_prints_its_messages(name, capsys):
     log = LOGS / f"{name}.mcap"
     assert len(cat(capsys, log, "/control/tick")) == WHOLE[name].ticks
     check_events(capsys, log, WHOLE[name])
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", MOST_IN_LONG)
 def test_export_writes_its_tables(name, tmp_path, capsys):
     files = told(capsys, "log", "export", LOGS / f"{name}.mcap", "--out", tmp_path / "tables")["files"]
     assert sum(files.values()) == WHOLE[name].messages
@@ -147,7 +149,7 @@ def test_export_writes_its_tables(name, tmp_path, capsys):
     assert WHOLE[name].speed * 0.9 < max(speeds) <= WHOLE[name].speed + 1e-9
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", MOST_IN_LONG)
 def test_report_makes_a_page_of_it(name, tmp_path, capsys):
     page = Path(told(capsys, "report", LOGS / f"{name}.mcap", "--out", tmp_path)["report"])
     text = page.read_text()

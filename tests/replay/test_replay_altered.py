@@ -337,6 +337,7 @@ def test_a_log_without_its_facts_does_not_pass(lost, sim_log, tmp_path, capsys):
     assert replayed(capsys, log)[0] == DAMAGED
 
 
+@pytest.mark.long
 def test_a_log_written_again_as_the_library_does_by_default_replays_and_a_change_is_found(sim_log, tmp_path, capsys):
     out = tmp_path / "run.mcap"
     assert replayed(capsys, rewritten(sim_log, out, data_crc=False))[0] == 0

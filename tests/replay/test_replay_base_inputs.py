@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.replay.older import derived_as
-from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten
+from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten, with_data
 from tools.cli import main
 from tools.replay import base_inputs
 from tools.replay.fold import replay
@@ -51,6 +51,21 @@ def test_an_edited_input_is_found_and_named_though_the_log_is_sealed(level, topi
     assert f"first difference: message at {told['arrived']['first_difference']['tick']}, {topic} {field}" in (
         capsys.readouterr().out
     )
+
+
+def test_of_messages_that_came_in_one_read_the_last_is_compared(sim_log, tmp_path, capsys):
+    topic = "/base/odom"
+
+    def edit(messages: Messages) -> Messages:
+        at = places(messages, topic)[20]
+        name, last = messages[at]
+        earlier = with_data(last, last.data[:8] + bytes((last.data[8] ^ 1,)) + last.data[9:])  # its stamp
+        edited = every_other_bit([(name, last)] * 11, topic, LOW_BYTE[topic])[0]
+        return [*messages[:at], (name, earlier), edited, *messages[at + 1 :]]
+
+    code, told = replayed(capsys, resealed(sim_log, tmp_path / "run.mcap", edit))
+    assert code == DIFFERS
+    assert told["arrived"]["first_difference"]["field"] == "/base/odom twist.twist.linear.x"
 
 
 def test_one_edited_command_that_was_really_sent_is_found(sim_log, sim_ticks, pushing_at, tmp_path, capsys):

@@ -66,7 +66,14 @@ def stops(scenario: Scenario) -> bool:
     return of_row(FAULTS[scenario.row], 0.1, 1.0) is not None
 
 
-@pytest.mark.parametrize("scenario", [s for s in SCENARIOS if stops(s)], ids=str)
+SLOW_ROWS = ("F45-retreat", "F46-retreat", "F53")
+"""Their scenarios are whole pushes."""
+STOPPING = [
+    pytest.param(s, id=str(s), marks=[pytest.mark.long] if s.row in SLOW_ROWS else []) for s in SCENARIOS if stops(s)
+]
+
+
+@pytest.mark.parametrize("scenario", STOPPING)
 def test_at_a_tenth_of_a_metre_a_second(scenario):
     judged(scenario, scenario.start, 0.1)
 

@@ -120,7 +120,7 @@ class BaseInputsReplayer:
                 if complete or log_time_ns <= state.newest_ns:
                     lost += len(waiting)
                     if first is None or log_time_ns < first.tick:
-                        logged = state.seen.get(log_time_ns, [None])[0]
+                        logged = state.seen.get(log_time_ns, [None])[-1]  # of those in one read, ticks hold the last
                         first = payload_difference(log_time_ns, topic, logged, waiting[0], _not_held(topic))
         return BaseInputsReplay(self._identical + lost, self._identical, first)
 

@@ -108,7 +108,7 @@ def test_fast_loop_and_offsets():
     assert offset_per_newton_m(0.3, 0.1, 13.7) == pytest.approx(0.95, abs=0.01)
 
 
-@pytest.mark.parametrize("body", [BOX, BARREL])
+@pytest.mark.parametrize("body", [BOX, pytest.param(BARREL, marks=pytest.mark.long)])
 @pytest.mark.parametrize("k_y", [0.2, 0.5])
 def test_a_disturbance_decays_in_the_simulated_world_as_fast_as_the_closed_form_says(body, k_y):
     simulated_per_s = -growth_rate(body, 0.3, k_y, frictionless=False)
@@ -123,7 +123,7 @@ def test_decay_of_known_poles():
     assert decay_per_m([PushedBody(round=False, rho_m=0.5, d_m=0.5)], 1.1, 0.1) == 0.0, "the force angle runs away"
 
 
-@pytest.mark.parametrize("body", [BOX, BARREL])
+@pytest.mark.parametrize("body", [BOX, pytest.param(BARREL, marks=pytest.mark.long)])
 def test_the_weave_grows_beyond_the_limit_and_not_below(body):
     k_y = sticking_limit(body, 0.3)
     assert growth_rate(body, 0.3, 0.97 * k_y, frictionless=False) < 0

@@ -431,6 +431,7 @@ def reader_of(process: ReportProcess, log: Path, *, at_least: int) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.long
 def test_a_log_is_read_while_it_grows(ran, tmp_path):
     whole = (ran[0] / "run.mcap").read_bytes()
     log = tmp_path / "run.mcap"

@@ -161,6 +161,7 @@ def test_one_changed_byte_anywhere_makes_a_part_unfinished(tmp_path):
     assert store.finished(1) == {0}
 
 
+@pytest.mark.long
 def test_a_part_of_another_study_is_run_again(tmp_path, grid, capsys):
     for name, gains in (("one", "0.3,0.2"), ("other", "0.3,0.1")):
         push(capsys, grid, "--out", tmp_path / name, "--gains", gains, "--workers", 1)

@@ -80,6 +80,7 @@ def test_a_family_is_proved_on_the_wire_too_where_commands_may_come_two_ticks_la
         assert 0 < row["measured_ticks"] <= row["bound_ticks"]
 
 
+@pytest.mark.long
 def test_rows_without_a_reaction_are_judged_by_a_check_of_their_own(tmp_path):
     for only in ("F13", "F62"):
         done = push("faults", "--run", "--only", only, "--json", state=tmp_path)

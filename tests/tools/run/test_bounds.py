@@ -143,7 +143,7 @@ def test_an_object_that_is_met_late_does_not_lead_out_of_the_workspace():
     assert {(o.command_body.vx, o.command_body.vy) for o in stopped} == {(0.0, 0.0)}
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))])
 @pytest.mark.parametrize("more", [("path.direction_deg=137",), ("base.pose_source=odometry",), ROOM])
 def test_a_normal_push_does_not_notice_it(seed, more):
     figures, ticks = run("control.distance_m=1.5", *more, seed=seed)

@@ -235,6 +235,7 @@ def test_a_paced_run_takes_as_long_as_it_says(tmp_path):
     assert 0.99 * duration_s < took_s < 10 * duration_s  # a slow host may take longer, never shorter
 
 
+@pytest.mark.long
 def test_osqp_and_the_closed_form_push_the_same_way(tmp_path):
     tracks = []
     for solver in ("exact", "osqp"):
