@@ -133,7 +133,7 @@ class WebSocketLink:
             return True  # decrypted already: the descriptor does not show it
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
-        return left_ns > 0 and bool(poll.poll(left_ns // 1_000_000))
+        return left_ns > 0 and bool(poll.poll(-(-left_ns // 1_000_000)))  # rounded up
 
     def abort(self) -> None:
         """Drop the connection with a reset, so that nothing of it is delivered later; never raises."""
