@@ -126,6 +126,31 @@ def test_ticks_count_from_zero_and_every_skipped_period_is_one(bench):
     ]
 
 
+def test_the_loop_wakes_early_and_waits_awake_for_its_deadline(bench, monkeypatch):
+    """150 us before each deadline; the tick begins on it, and the grid of 10 ms stays."""
+    loop, now_ns = bench.loop, [5_000_000_000]
+
+    def clock():
+        now_ns[0] += 40_000
+        return now_ns[0]
+
+    monkeypatch.setattr(loop, "_clock", clock)
+    monkeypatch.setattr(loop._loop, "run", lambda: None)
+    sensor_in, sensor_out = os.pipe()
+    monkeypatch.setattr(bench.sensor, "fileno", lambda: sensor_in)
+    lates = []
+    monkeypatch.setattr(loop, "_one_tick", lambda inp: lates.append((inp.host.late_ns, inp.host.skipped)))
+    loop.run(150.0)
+    assert loop._timer.deadline_ns == loop.first_ns - 150_000
+    loop._timer.cancel()
+    now_ns[0] = loop.first_ns - 150_000  # the clock then reads 110, 70 and 30 us before, and 10 us after
+    loop._on_deadline(loop.first_ns - 150_000)
+    assert lates == [(10_000, 0)]
+    assert loop._timer.deadline_ns == loop.first_ns + 10_000_000 - 150_000
+    os.close(sensor_in)
+    os.close(sensor_out)
+
+
 @pytest.mark.parametrize(
     ("alive", "gone", "seen"),
     [(True, (), True), (False, (), False), (True, ("gate",), False), (True, ("arm", "recorder"), True)],
