@@ -165,3 +165,12 @@ def test_a_pause_of_this_process_right_after_reading_is_no_silence_of_the_bridge
     assert base.health().state == LinkState.UP  # what has come meanwhile is read next time
     base.drain()
     assert base.health().state == LinkState.LOST
+
+
+def test_a_wait_in_which_nothing_comes_is_not_cut_short(ends):
+    """Also by less than a millisecond, in which poll(2) counts."""
+    link, _ = ends
+    for _ in range(5):
+        until_ns = time.monotonic_ns() + 1_900_000
+        assert not link.wait_readable(until_ns)
+        assert time.monotonic_ns() >= until_ns
