@@ -97,6 +97,13 @@ class Floor:
             sampled = model.shape.rim_points() if pressure == "rim" else model.shape.grid_points(SUPPORT_ACROSS)
             self._patches = _Patches(model, sampled, field)
 
+    @property
+    def steady(self) -> tuple[float, float, float, float, float, float] | None:
+        """Return moments and shift as `resisting_d` takes them, None where the grip follows more than the push."""
+        if self._moment is None or self._patches is not None or self._has_grain:
+            return None
+        return (*self._moment, self._shift_m, self._off_x, self._off_y)
+
     def own_solver(self, asked: str, point_on_polygon: bool) -> ContactSolver | None:
         """Return what solves a contact on this floor, None where an ellipsoid's solvers do.
 
@@ -122,10 +129,7 @@ class Floor:
         d, f_max, shift_m = self._d, self._f_max, self._shift_m
         cof_x, cof_y = self._cof
         if self._moment is not None:
-            xx, xy, yy = self._moment
-            dd = xx * push_x * push_x + 2.0 * xy * push_x * push_y + yy * push_y * push_y
-            lean = shift_m + self._off_x * push_x + self._off_y * push_y
-            d = sqrt(max(dd - lean * lean, dd * LIFTED))
+            d = resisting_d(push_x, push_y, *self._moment, shift_m, self._off_x, self._off_y)
         if self._patches is not None:
             shift_x, shift_y, load, spread = self._patches(x, y, cos_, sin_)
             cof_x, cof_y, f_max, d = cof_x + shift_x, cof_y + shift_y, f_max * load, d * spread
@@ -141,6 +145,18 @@ class Floor:
         c, s = c0 * cos_ + s0 * sin_, s0 * cos_ - c0 * sin_  # the direction, BODY
         across = ratio * ratio
         return (c * c + across * s * s, (1.0 - across) * c * s, s * s + across * c * c)
+
+
+def resisting_d(
+    ux: float, uy: float, xx: float, xy: float, yy: float, shift: float, off_x: float, off_y: float
+) -> float:
+    """Return d (m) of a floor that resists turning along the push, for a push along the unit vector u (BODY).
+
+    xx, xy, yy: the pressure's moments (m^2). shift, off: how far its centre moves with the push (m).
+    """
+    dd = xx * ux * ux + 2.0 * xy * ux * uy + yy * uy * uy
+    lean = shift + off_x * ux + off_y * uy
+    return sqrt(max(dd - lean * lean, dd * LIFTED))
 
 
 class _Patches:

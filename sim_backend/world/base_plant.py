@@ -60,7 +60,8 @@ class BasePlant:
         self._tick_due_ns = self._grid_time_of_tick(0)
         self._now_ns = start_ns
         self._start = start
-        self._grip = 1.0 - slip
+        self.grip = 1.0 - slip
+        """Share of the wheels' way that is not lost."""
         self._x, self._y, self._yaw = start.x, start.y, start.yaw
         self._velocity = BodyTwist()
         self._drivers_active = True
@@ -87,7 +88,7 @@ class BasePlant:
     @property
     def rolled(self) -> Pose2D:
         """The pose had the wheels not slipped, which is what they count."""
-        start, grip = self._start, self._grip
+        start, grip = self._start, self.grip
         return Pose2D(start.x + (self._x - start.x) / grip, start.y + (self._y - start.y) / grip, wrap_angle(self._yaw))
 
     @property
@@ -126,10 +127,24 @@ class BasePlant:
     def step_to(self, t_ns: int) -> None:
         """Step to the last grid time that is not after `t_ns`; an earlier time changes nothing."""
         while self._now_ns + GRID_NS <= t_ns:
-            if self._now_ns >= self._tick_due_ns:
-                self._control_tick()
+            self.leave()
             self._integrate()
             self._now_ns += GRID_NS
+
+    def leave(self) -> None:
+        """Leave the present grid time: the controller's tick takes effect if it is due."""
+        if self._now_ns >= self._tick_due_ns:
+            self._control_tick()
+
+    @property
+    def steps_at_this_velocity(self) -> int:
+        """How many grid steps from now on the wheels keep their velocity; to be asked on leaving a grid time."""
+        return max(-((self._now_ns - self._tick_due_ns) // GRID_NS), 0)
+
+    def roll_to(self, place: tuple[float, float, float], steps: int) -> None:
+        """Accept where so many steps at the present velocity have brought the base, worked out elsewhere."""
+        self._x, self._y, self._yaw = place
+        self._now_ns += steps * GRID_NS
 
     def _grid_time_of_tick(self, tick: int) -> int:
         return self._start_ns + GRID_NS * math.ceil((tick + self._tick_phase) * self._tick_period_ns / GRID_NS)
@@ -160,7 +175,7 @@ class BasePlant:
             return
         turn = v.omega * _GRID_S
         cosine, sine = math.cos(self._yaw + 0.5 * turn), math.sin(self._yaw + 0.5 * turn)
-        way_s = _GRID_S * self._grip
+        way_s = _GRID_S * self.grip
         self._x += (v.vx * cosine - v.vy * sine) * way_s
         self._y += (v.vx * sine + v.vy * cosine) * way_s
         self._yaw += turn

@@ -13,6 +13,7 @@ from robot_io.geometry import point_outside, seen_from_frame
 from robot_io.log.world_messages import WorldCommand, WorldStall, WorldStart, WorldState
 from robot_io.messages import BodyTwist, Joints, Pose2D, Vector3
 from robot_io.rig.config import RigConfig
+from sim_backend.physics.contact import PushedSlider
 from sim_backend.physics.contact_outcome import FREE
 from sim_backend.world.arm_geometry import held_elsewhere
 from sim_backend.world.base_plant import GRID_NS, BasePlant
@@ -21,6 +22,7 @@ from sim_backend.world.human import Human
 from sim_backend.world.plant import ArmTruth, BaseTruth
 from sim_backend.world.scene import place
 from sim_backend.world.sensor_model import SensorModel
+from sim_backend.world.steady_push import SteadyPush
 from sim_backend.world.truth import true_frames
 
 STATE_EVERY_STEPS = 10
@@ -34,11 +36,17 @@ class World:
     """Implements FtSource, ArmSource and BaseSource over one slider world.
 
     rig: its `world`, `frames` and `path` tables are used. start_ns: origin of the grid (CLOCK_MONOTONIC or
-    virtual). on_record: called with each record, in order; without it none is made.
+    virtual). on_record: called with each record, in order; without it none is made. compiled: see `SteadyPush`.
     """
 
     def __init__(
-        self, rig: RigConfig, seed: int, start_ns: int, on_record: Callable[[WorldRecord], None] | None = None
+        self,
+        rig: RigConfig,
+        seed: int,
+        start_ns: int,
+        on_record: Callable[[WorldRecord], None] | None = None,
+        *,
+        compiled: bool = False,
     ) -> None:
         scene = place(rig, seed)
         self.seed = seed
@@ -56,6 +64,9 @@ class World:
         self._human = Human(self._held, rig.world.hand, start_ns)
         self._reach = frames.contact_in_base_m[:2]
         self._ball = point_outside(*self._plant.place, *self._reach)
+        self._steady = None
+        if isinstance(self._slider, PushedSlider):
+            self._steady = SteadyPush(self._plant, self._slider, self._reach, compiled=compiled)
         self._contact = FREE
         self._arm_moved = False
         self._start_ns = start_ns
@@ -78,8 +89,8 @@ class World:
             self.stalls += 1
             if self._on_record is not None:
                 self._on_record(WorldStall(self.now_ns, due))
-        for _ in range(due):
-            self._step()
+        while due > 0:
+            due -= self._go_on(due) or self._step()
 
     def read_ft(self, t_ns: int) -> tuple[float, float, float, float, float, float]:
         """See `FtSource.read_ft`."""
@@ -133,12 +144,30 @@ class World:
         self._arm_moved = True
         self._human.move_arm(joints, in_s, at_ns)
 
-    def _step(self) -> None:
+    def _go_on(self, steps: int) -> int:
+        """Advance by as many steps as the push goes on as it is, and at most to the next record; return how many."""
+        if self._steady is None:
+            return 0
+        if self._on_record is not None:
+            steps = min(steps, STATE_EVERY_STEPS - self._steps % STATE_EVERY_STEPS)
+        found = self._steady.advance(steps, self._ball)
+        if found is None:
+            return 0
+        done, self._ball, self._contact = found
+        self._steps += done
+        self._record()
+        return done
+
+    def _step(self) -> int:
         self._steps += 1
         self._plant.step_to(self.now_ns)
         ball = point_outside(*self._plant.place, *self._reach)
         self._contact = self._slider.step(self._ball, ball, GRID_NS * 1e-9)
         self._ball = ball
+        self._record()
+        return 1
+
+    def _record(self) -> None:
         if self._on_record is not None and self._steps % STATE_EVERY_STEPS == 0:
             self._on_record(self._state())
 

@@ -66,7 +66,7 @@ class Lockstep:
 
     log: None keeps nothing, so that no record is made at all; nothing else changes. law: the rig's law where it is
     not a shipped one; raises ConfigError without it. timed: whether a step of such a law that takes too long is a
-    fault: what else this machine does may then change a run.
+    fault: what else this machine does may then change a run. compiled: see `World`; for whoever makes many pushes.
     """
 
     def __init__(
@@ -78,12 +78,14 @@ class Lockstep:
         saved: SavedTare | None = None,
         law: Law | None = None,
         timed: bool = True,
+        compiled: bool = False,
     ) -> None:
         self.rig = rig
         self._log = log
         self._clock = VirtualClock(START_NS)
         self._period_ns = round(NS_PER_S / rig.loop.rate_hz)
-        self.world = World(rig, seed, START_NS, None if log is None else ring_listener(log.record))
+        on_record = None if log is None else ring_listener(log.record)
+        self.world = World(rig, seed, START_NS, on_record, compiled=compiled)
         world = rig.world
         self._ft = simulated_sensor(rig, self.world, self._clock)
         self._arm = SimUr10(self.world, self._clock, rate_hz=world.arm_cycle_hz, phase=world.arm_phase)

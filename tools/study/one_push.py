@@ -108,7 +108,7 @@ def _ended(job: Job, rig: RigConfig, course: Course) -> Row:
         log = open_log(path, push.rig, push.seed, in_contact=False, derive=not job.ticks)
     try:
         # What else this machine does must not decide a study: the time of a law's step is judged by `push run`.
-        one = Lockstep(rig, push.seed, log, law=law, timed=False)
+        one = Lockstep(rig, push.seed, log, law=law, timed=False, compiled=True)
 
         def on_tick(inp: TickInput, state: TickState, output: TickOutput) -> None:
             course.note(inp.tick, state, one.world)
