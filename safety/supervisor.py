@@ -72,15 +72,20 @@ def supervise(
     had to clamp in the previous tick.
     """
     state, faults = _gather(settings, state, inp, control, wanted, clamped)
-    faults = _after_pause(state, inp, faults)
-    new = tuple(str(i) for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in state.latched)
-    latched = state.latched + new
+    latched = state.latched
+    if faults:
+        faults = _after_pause(state, inp, faults)
+        latched += tuple(str(i) for i in faults if FAULTS[i].clears == Clears.LATCHED and i not in latched)
     asked = max(strongest(tuple(faults)), strongest(latched), Mode.HOLD if inp.paused else Mode.SILENT)
-    state = replace(state, latched=latched, grace_ticks=1 if _pause(state, inp) else 0)
+    grace_ticks = 1 if _pause(state, inp) else 0
+    if grace_ticks != state.grace_ticks or latched is not state.latched:
+        state = replace(state, latched=latched, grace_ticks=grace_ticks)
     mode, state = _next_mode(state, asked, control, inp.now_ns)
     stopping = mode >= Mode.STOP
     stop_since = (state.stop_since_ns or inp.now_ns) if stopping else 0
-    state = _note_first(replace(state, mode=int(mode), stop_since_ns=stop_since), faults, inp.now_ns)
+    if mode != state.mode or stop_since != state.stop_since_ns:
+        state = replace(state, mode=int(mode), stop_since_ns=stop_since)
+    state = _note_first(state, faults, inp.now_ns)
     finished, code = _ending(state, inp, control)
     values = {**dict.fromkeys(latched, math.nan), **{str(i): value_of(i) for i in faults}}
     return state, Verdict(mode, tuple(values), tuple(values.values()), finished, code)

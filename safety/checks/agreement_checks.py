@@ -84,13 +84,13 @@ def check(
         return replace(state, motion=replace(motion, pose_ns=state.pose_ns, marks=(_mark(motion, state),))), []
     now = _mark(motion, state)
     if state.pose_ns != motion.pose_ns and not state.pose_jumps and not settings.pose_is_odometry:
-        off = max((_of_pose(mark, now, inp) for mark in motion.marks if not _near_by_pose(mark, now)), default=0.0)
+        off = _off_by_pose(motion.marks, now, inp)
         motion = _note_place(
             replace(motion, pose_ns=state.pose_ns, pose_run=motion.pose_run + 1 if off > 1.0 else 0), now
         )
         if motion.pose_run >= RUN and not _perhaps_stuck(state, inp):
             faults.append(Finding("F43" if _way_at_one_place(motion) > STILL_WAY_M else "F37", off))
-    off = max((_of_command(mark, now, inp) for mark in motion.marks if not _near_by_command(mark, now)), default=0.0)
+    off = _off_by_command(motion.marks, now, inp)
     motion = replace(motion, command_run=motion.command_run + 1 if off > 1.0 else 0, marks=_kept(motion.marks, now))
     if motion.command_run >= RUN:
         faults.append(Finding("F33-way", off))
@@ -166,19 +166,31 @@ def _perhaps_stuck(state: SafetyState, inp: TickInput) -> bool:
     return way < STUCK_SHARE * (force.sent_x * force.sent_x + force.sent_y * force.sent_y)
 
 
-def _near_by_pose(then: MotionMark, now: MotionMark) -> bool:
-    """Return whether pose and odometry differ so little since then that every direction and time allows it."""
-    return (
-        math.hypot(now.x - then.x - now.way_x + then.way_x, now.y - then.y - now.way_y + then.way_y) < SURE * FLOOR_M
-        and abs(now.yaw - then.yaw - now.way_yaw + then.way_yaw) < SURE * TURN_FLOOR_RAD
-    )
+def _off_by_pose(marks: tuple[MotionMark, ...], now: MotionMark, inp: TickInput) -> float:
+    """Return the most that pose and odometry differ since any of these moments, as a share of what is allowed.
+
+    0 where they differ so little that every direction and time allows it at this speed, as nearly always.
+    """
+    off, sent = 0.0, inp.base.sent
+    near_m = SURE * (FLOOR_M + TIMING_S * math.hypot(sent.vx, sent.vy))
+    x, y, yaw = now.x - now.way_x, now.y - now.way_y, now.yaw - now.way_yaw
+    for then in marks:
+        dx, dy = x - then.x + then.way_x, y - then.y + then.way_y
+        if not (dx * dx + dy * dy < near_m * near_m and abs(yaw - then.yaw + then.way_yaw) < SURE * TURN_FLOOR_RAD):
+            off = max(off, _of_pose(then, now, inp))
+    return off
 
 
-def _near_by_command(then: MotionMark, now: MotionMark) -> bool:
+def _off_by_command(marks: tuple[MotionMark, ...], now: MotionMark, inp: TickInput) -> float:
     """Return the same of odometry and command."""
-    x = now.way_x - then.way_x - now.sent_x + then.sent_x
-    y = now.way_y - then.way_y - now.sent_y + then.sent_y
-    return math.hypot(x, y) < SURE * COMMAND_FLOOR_M
+    off, sent = 0.0, inp.base.sent
+    near_m = SURE * (COMMAND_FLOOR_M + COMMAND_TIMING_S * math.hypot(sent.vx, sent.vy))
+    x, y = now.way_x - now.sent_x, now.way_y - now.sent_y
+    for then in marks:
+        dx, dy = x - then.way_x + then.sent_x, y - then.way_y + then.sent_y
+        if not dx * dx + dy * dy < near_m * near_m:
+            off = max(off, _of_command(then, now, inp))
+    return off
 
 
 def _of_pose(then: MotionMark, now: MotionMark, inp: TickInput) -> float:

@@ -52,7 +52,7 @@ def check(
         if control.phase != Phase.LOST:  # a force that turns about goes through none
             wrong = wrong + 1 if sought and _wrong(settings.base_from_sensor, control, inp.base.sent, reading) else 0
         before, last, torque = last, reading.force, reading.torque
-    frozen = max((run for run, scatters in zip(runs, settings.scatters, strict=True) if scatters), default=0)
+    frozen = max([run for run, scatters in zip(runs, settings.scatters, strict=True) if scatters], default=0)
     if frozen >= settings.frozen_readings and control.speed > 0.0:
         faults.append(Finding("F06", frozen))
     if wrong >= WRONG_READINGS:
@@ -89,7 +89,10 @@ def _rate(state: ForceState, inp: TickInput) -> tuple[ForceState, float]:
 
 
 def _axis_runs(runs: Counts6, old: Vector6, new: Vector6, same: Vector6) -> Counts6:
-    a, b, c, d, e, f = (run + 1 if abs(new[i] - old[i]) < same[i] else 0 for i, run in enumerate(runs))
+    a, b, c, d, e, f = [
+        run + 1 if abs(after - before) < close else 0
+        for run, before, after, close in zip(runs, old, new, same, strict=True)
+    ]
     return a, b, c, d, e, f
 
 

@@ -12,7 +12,7 @@ from safety.settings import SafetySettings
 from safety.travel import Travel
 
 APPROACH, PUSH, RETREAT = 1, 2, 3
-GROUPS = {
+GROUPS: dict[int, int] = {
     Phase.APPROACH: APPROACH,
     Phase.PUSH: PUSH,
     Phase.LOST: PUSH,
@@ -44,7 +44,7 @@ def check(
     if furthest > FAR_M:
         faults.append(Finding("R07", furthest))
     motion = state.motion
-    group = GROUPS.get(Phase(control.phase), motion.group)
+    group = GROUPS.get(control.phase, motion.group)
     if not group:
         return state, faults
     if group != motion.group:

@@ -52,7 +52,7 @@ def _of_reading(
     torque: tuple[float, float, float],
     control: ControlState,
 ) -> list[str]:
-    if not all(math.isfinite(value) for value in (*force, *torque)):
+    if not all(map(math.isfinite, (*force, *torque))):
         return ["F10"]
     faults: list[str] = []
     most = settings.saturated

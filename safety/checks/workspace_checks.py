@@ -24,6 +24,8 @@ STANDING_M_PER_S = 0.01
 """A slower measured speed has no direction."""
 FAR_M = 1e6
 """Whatever would go further is outside anyway; beyond all numbers it would have no direction."""
+CLEAR_M = 1e-6
+"""With this much more room than the longest way ahead, rounding cannot find too little."""
 OBJECT_KNOWN_NS = 500_000_000
 """An object that was not seen for longer is not judged: it is in nobody's view."""
 
@@ -57,8 +59,11 @@ def check(
         if workspace.given and (left := room_for_push(workspace, pose, slider)) < 0.0:
             faults.append(Finding("R06", left))
     edge = workspace.given or tuple(zip(state.workspace.corners_x, state.workspace.corners_y, strict=True))
-    ahead = _ahead(workspace, inp, pose.yaw, (inp.now_ns - state.pose_ns) * 1e-9)
+    age_s = (inp.now_ns - state.pose_ns) * 1e-9
     here = distance_inside(edge, pose.x, pose.y) - math.hypot(workspace.half_length, workspace.half_width)
+    if slider is None and here > CLEAR_M + max(workspace.slow_m, _furthest_m(inp, age_s)):
+        return state, faults  # in the middle of the floor, as nearly always
+    ahead = _ahead(workspace, inp, pose.yaw, age_s)
     left_slow, left_stop = (
         min(_room_of_base(workspace, edge, pose, shifts, here), _room_of_object(workspace, slider, shifts))
         for shifts in (ahead.slow, ahead.stop)
@@ -80,6 +85,14 @@ def _object_pose(inp: TickInput) -> Pose2D | None:
 def _begin(workspace: WorkspaceSettings, start: Pose2D) -> WorkspaceState:
     a, b, c, d = start_box(workspace, start)
     return WorkspaceState(True, (a[0], b[0], c[0], d[0]), (a[1], b[1], c[1], d[1]))
+
+
+def _furthest_m(inp: TickInput, age_s: float) -> float:
+    """Return how far at most anything would go on by the velocities of `_ahead`; infinite where one is no number."""
+    sent, measured = inp.base.sent, inp.base.odometry
+    speed = max(math.hypot(sent.vx, sent.vy), math.hypot(measured.vx, measured.vy))
+    known = math.isfinite(sent.vx + sent.vy + measured.vx + measured.vy)
+    return alone_m(speed) + abs(age_s) * speed if known else math.inf
 
 
 def _ahead(workspace: WorkspaceSettings, inp: TickInput, yaw: float, age_s: float) -> _Ahead:
@@ -106,7 +119,7 @@ def _room_of_base(
     """Return the least room (m) of the base's outline there; `here`: the least it has at its pose, however turned."""
     length, width = workspace.half_length, workspace.half_width
     far = here - max([math.hypot(dx, dy) for dx, dy, _ in shifts])
-    if far > 0.0:  # in the middle of the floor, as nearly always
+    if far > 0.0:
         return far
     return min(
         room(edge, rectangle(Pose2D(pose.x + dx, pose.y + dy, pose.yaw + turn), (-length, length), (-width, width)))

@@ -7,7 +7,6 @@ outside, BODY frame of the slider inside; floats only, so that the same steps gi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import ceil, cos, hypot, pi, remainder, sin
 from typing import Literal
 
@@ -68,7 +67,6 @@ class PushedSlider:
         self._cof_x, self._cof_y = model.cof_m
         self._grain: Grain | None = None
         self._floor = floor
-        self._steady = floor.steady if floor is not None and solver == "exact" and ball_radius_m else None
         self._push_x = self._push_y = 0.0  # direction of the push force, BODY
         self._new = True  # no push of a step before
         self.x_m, self.y_m, self.heading_rad = pose
@@ -86,36 +84,6 @@ class PushedSlider:
         """Pose of the slider's body origin, WORLD frame."""
         yaw = remainder(self.heading_rad, 2 * pi)
         return Pose2D(self.x_m, self.y_m, pi if yaw == -pi else yaw)
-
-    @property
-    def face(self) -> int:
-        """The face that the ball pushes (0 on a disc), -1 for a corner; meaningful only in contact."""
-        return self._face
-
-    @property
-    def state(self) -> tuple[float, ...]:
-        """Pose, contact and push as the steady kernel has them, from `x` on."""
-        place = (self.x_m, self.y_m, self.heading_rad, self._cos, self._sin)
-        return (*place, self._nx, self._ny, self._cx, self._cy, self._push_x, self._push_y)
-
-    def goes_on_from(self, ball: tuple[float, float]) -> bool:
-        """Return whether a ball here may go on pushing as the steady kernel has it."""
-        return self._touching and not self._new and self._face >= 0 and self._steady is not None and ball == self._ball
-
-    def steady_given(self) -> tuple[float, ...]:
-        """Return what the kernel takes as given, from `radius` on."""
-        face = self._outline.rows[self._face][:5] if self._outline.rows else (0.0,) * 5
-        ball = (self._radius, self._piece_m, REST_M_PER_S)
-        floor = (*(self._steady or ()), *self.model.cof_m, self._f_max, self._mu)
-        return (*ball, *floor, self._outline.radius_m, *face)
-
-    def continue_at(self, ball: tuple[float, float], state: Sequence[float]) -> ContactOutcome:
-        """Accept what the kernel found, from `x` on, with the ball where it brought it; return the contact there."""
-        self.x_m, self.y_m, self.heading_rad, self._cos, self._sin = state[:5]
-        self._nx, self._ny, self._cx, self._cy, self._push_x, self._push_y = state[5:11]
-        self._ball = ball
-        self._outcome = ContactOutcome(_MODES[int(state[17])], *state[11:17])
-        return self._outcome
 
     def gap_m(self, ball_xy: tuple[float, float]) -> float:
         """Return the free distance between a ball at `ball_xy` and the slider (negative: overlap)."""

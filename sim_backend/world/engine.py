@@ -9,6 +9,7 @@ from robot_io.messages import Pose2D
 from robot_io.rig.config import RigConfig
 from sim_backend.physics.contact import PushedSlider
 from sim_backend.physics.contact_outcome import ContactOutcome
+from sim_backend.physics.steady.slider import SteadySlider
 from sim_backend.physics.support import centre_of, leaning
 from sim_backend.world.base_plant import GRID_NS
 from sim_backend.world.scene import floor_of, shape_of, slider_model, support_of
@@ -36,7 +37,10 @@ def pushed_object(rig: RigConfig, seed: int, pose: Pose2D) -> PushedObject:
     at = (pose.x, pose.y, pose.yaw)
     if world.engine == "mujoco":
         return _rigid_slider(rig, at)
-    return PushedSlider(slider_model(world.slider), at, world.ball_radius_m, world.solver, floor_of(rig, seed))
+    model, floor = slider_model(world.slider), floor_of(rig, seed)
+    if world.solver == "exact" and floor is not None and floor.steady is not None:
+        return SteadySlider(model, at, world.ball_radius_m, floor)
+    return PushedSlider(model, at, world.ball_radius_m, world.solver, floor)
 
 
 def _rigid_slider(rig: RigConfig, at: tuple[float, float, float]) -> PushedObject:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim_backend.physics.contact import PushedSlider
 from sim_backend.physics.contact_outcome import ContactOutcome
 from sim_backend.physics.steady import kernel
+from sim_backend.physics.steady.slider import SteadySlider
 from sim_backend.world.base_plant import GRID_NS, BasePlant
 
 
@@ -17,7 +17,7 @@ class SteadyPush:
     """
 
     def __init__(
-        self, plant: BasePlant, slider: PushedSlider, reach: tuple[float, float], *, compiled: bool = False
+        self, plant: BasePlant, slider: SteadySlider, reach: tuple[float, float], *, compiled: bool = False
     ) -> None:
         self._plant, self._slider, self._reach = plant, slider, reach
         machine = kernel.compiled() if compiled else None
@@ -27,9 +27,9 @@ class SteadyPush:
         self._given_for: object = None
 
     def advance(self, steps: int, ball: tuple[float, float]) -> tuple[int, tuple[float, float], ContactOutcome] | None:
-        """Advance by at most `steps` (at least 1, of 1 ms) from the ball's position (m, WORLD); return how many, ball and contact.
+        """Advance by at most `steps` (at least 1, of 1 ms) and return how many these were, the ball and the contact.
 
-        Returns None where the next step is none of a push that goes on as it is.
+        ball: its centre now, m, WORLD. Returns None where the next step is none of a push that goes on as it is.
         """
         slider, plant = self._slider, self._plant
         if not slider.goes_on_from(ball):
@@ -57,7 +57,7 @@ class SteadyPush:
     def _given_now(self) -> Any:
         velocity = self._plant.velocity
         motion = (velocity.vx, velocity.vy, velocity.omega, GRID_NS * 1e-9, self._plant.grip, *self._reach)
-        given = [*motion, *self._slider.steady_given()]
+        given = [*motion, *self._slider.given()]
         if self._arrays:
             import numpy as np
 

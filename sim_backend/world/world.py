@@ -13,8 +13,8 @@ from robot_io.geometry import point_outside, seen_from_frame
 from robot_io.log.world_messages import WorldCommand, WorldStall, WorldStart, WorldState
 from robot_io.messages import BodyTwist, Joints, Pose2D, Vector3
 from robot_io.rig.config import RigConfig
-from sim_backend.physics.contact import PushedSlider
 from sim_backend.physics.contact_outcome import FREE
+from sim_backend.physics.steady.slider import SteadySlider
 from sim_backend.world.arm_geometry import held_elsewhere
 from sim_backend.world.base_plant import GRID_NS, BasePlant
 from sim_backend.world.engine import pushed_object
@@ -65,7 +65,7 @@ class World:
         self._reach = frames.contact_in_base_m[:2]
         self._ball = point_outside(*self._plant.place, *self._reach)
         self._steady = None
-        if isinstance(self._slider, PushedSlider):
+        if isinstance(self._slider, SteadySlider):
             self._steady = SteadyPush(self._plant, self._slider, self._reach, compiled=compiled)
         self._contact = FREE
         self._arm_moved = False

@@ -1,9 +1,10 @@
 """One process of a pushing run killed or frozen: when the base was told zero, when its wheels stood, what stayed.
 
 All times are CLOCK_MONOTONIC: the signal's here, a command's arrival and the wheels' in the log of the emulated world.
-A round in which the host did not let the gate or the emulators (or a launcher that is to die) run for 10 ms in all (the
-kernel's own count of time spent waiting for a processor), or a processor stood still for that long, says nothing and is
-repeated.
+A round in which the host did not let gate and emulators (with a launcher that is to die: launcher and control, too) run
+for 10 ms in all, from the signal until the wheels stood (the kernel's own count of time spent waiting for a processor),
+or a processor stood still for that long, says nothing and is repeated. All together, because each waits for the one
+before: a launcher's death kills control, control's death tells the gate, and the gate tells the base.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from tests.push_runs import QUICK, Ended, Run, stands, started, world_of
 
 PUSHING = r"PUSH +(?!0\.00/)[0-9.]+/.* v {speed:.2f} m/s"
 STALL_MS = 10.0
+WATCHED_NS = 120_000_000
 
 
 class Round(NamedTuple):
@@ -67,19 +69,19 @@ def strike(
     name: of the process, or of several with a space between.
     """
     with pushing(state, folder, host, speed=speed) as (run, pids):
-        watched = {pids[who] for who in ("gate", "emulators", *([name] if name == "launcher" else []))}
-        before = _waited_ms(watched)
+        watched = {pids[who] for who in ("gate", "emulators", *(("launcher", "control") if name == "launcher" else ()))}
+        waits = [(time.monotonic_ns(), _waited_ms(watched))]
         at_ns = time.monotonic_ns()
         for one in name.split():
             os.kill(pids[one], number)
-        time.sleep(0.12)
-        waited = [after - before[pid] for pid, after in _waited_ms(watched).items()]
-        stall_ms = max([host.worst_ms(at_ns, time.monotonic_ns()), *waited])
+        while waits[-1][0] < at_ns + WATCHED_NS:
+            time.sleep(0.002)
+            waits.append((time.monotonic_ns(), waits[-1][1] | _waited_ms(watched)))  # who is gone keeps its last count
         ended = run.wait(20.0)
         run.wait_gone(3.0)
         gone_ms = (time.monotonic_ns() - at_ns) / 1e6
     if not (folder / log).exists():
-        return Round(ended, folder, None, None, stall_ms, gone_ms, 0.0, at_ns)
+        return Round(ended, folder, None, None, _stall_ms(host, waits, at_ns, None), gone_ms, 0.0, at_ns)
     commands, wheels = world_of(folder / log)
     moving = [twist for t_ns, twist in wheels if t_ns <= at_ns]
     assert moving, "the base was not yet there"
@@ -91,7 +93,7 @@ def strike(
         folder,
         None if zero is None else (zero - at_ns) / 1e6,
         None if rest is None else (rest - at_ns) / 1e6,
-        stall_ms,
+        _stall_ms(host, waits, at_ns, rest),
         gone_ms,
         (wheels[-1][0] - at_ns) / 1e6,
         at_ns,
@@ -145,6 +147,13 @@ def _kept(found: Round, zero_ms: float | None, rest_ms: float) -> bool:
     if zero_ms is None:
         return found.rest_ms <= rest_ms
     return found.zero_ms is not None and found.zero_ms <= zero_ms and found.rest_ms <= found.zero_ms + rest_ms
+
+
+def _stall_ms(host: HostWatch, waits: list[tuple[int, dict[int, float]]], at_ns: int, rest_ns: int | None) -> float:
+    """Return how long the host held the round back between the blow and the wheels' rest, as far as it was watched."""
+    until_ns = waits[-1][0] if rest_ns is None else min(rest_ns, waits[-1][0])
+    last = next(waited for t_ns, waited in waits if t_ns >= until_ns)
+    return max(host.worst_ms(at_ns, until_ns), sum(last[pid] - waited for pid, waited in waits[0][1].items()))
 
 
 def _waited_ms(pids: set[int]) -> dict[int, float]:

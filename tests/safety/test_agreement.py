@@ -222,7 +222,9 @@ def test_what_is_left_out_unseen_is_never_too_far_off(way, off, command_off, tim
         then.sent_y + way[1] + command_off[1],
     )
     inp = replace(FoldBench().good_input(), base=BaseRecord(sent=BodyTwist(sent, 0.0, 0.0)))
-    if agreement_checks._near_by_pose(then, now):
-        assert agreement_checks._of_pose(then, now, inp) <= 1.0
-    if agreement_checks._near_by_command(then, now):
-        assert agreement_checks._of_command(then, now, inp) <= 1.0
+    for looked, found in (
+        (agreement_checks._of_pose(then, now, inp), agreement_checks._off_by_pose((then,), now, inp)),
+        (agreement_checks._of_command(then, now, inp), agreement_checks._off_by_command((then,), now, inp)),
+    ):
+        assert found in (0.0, looked)
+        assert found == looked or looked <= 1.0

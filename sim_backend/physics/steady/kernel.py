@@ -53,7 +53,8 @@ def plain(given: Floats, state: Floats, steps: int) -> int:
     while done < steps:
         # the base rolls on, and the ball with it
         cb, sb = cos(yaw + 0.5 * turned), sin(yaw + 0.5 * turned)
-        to_base_x, to_base_y = base_x + (v_x * cb - v_y * sb) * (dt * grip), base_y + (v_x * sb + v_y * cb) * (dt * grip)
+        to_base_x = base_x + (v_x * cb - v_y * sb) * (dt * grip)
+        to_base_y = base_y + (v_x * sb + v_y * cb) * (dt * grip)
         cb, sb = cos(yaw + turned), sin(yaw + turned)
         to_x, to_y = to_base_x + cb * reach_x - sb * reach_y, to_base_y + sb * reach_x + cb * reach_y
         dx, dy = to_x - ball_x, to_y - ball_y
