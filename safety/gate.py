@@ -30,6 +30,8 @@ STEP_MARGIN = 1.2
 """A step of the command may exceed the acceleration limit by this much (rounding, lateness)."""
 REPEAT_NS = 18_000_000
 """Unchanged or growing commands are sent every 20 ms (less the jitter of a tick); reduced and zero ones at once."""
+FRESH_NS, REPEAT_AT_MOST_NS = 2_000_000, 30_000_000
+"""They leave with a frame that has just come, so that they are not old already, or after 30 ms where none comes."""
 CONTACT_MARGIN = 1.001
 """The contact ball may exceed the envelope by this much (rounding in the envelope's scaling)."""
 OVERSPEED_SAMPLES = 3
@@ -156,9 +158,11 @@ def due(state: GateState, now_ns: int) -> BodyTwist | None:
     if state.frame_ns == 0 and not state.latch:
         return None
     wanted = state.twist
-    if now_ns - state.sent_ns >= REPEAT_NS or (wanted != state.sent and reduces(wanted, state.sent)):
+    silent_ns = now_ns - state.sent_ns
+    fresh = state.latch or now_ns - state.frame_ns < FRESH_NS
+    if silent_ns >= REPEAT_NS and (fresh or silent_ns >= REPEAT_AT_MOST_NS):
         return wanted
-    return None
+    return wanted if wanted != state.sent and reduces(wanted, state.sent) else None
 
 
 def sent(state: GateState, twist: BodyTwist, now_ns: int) -> GateState:

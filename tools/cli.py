@@ -138,6 +138,11 @@ COMMANDS = {
         "measure how late the control loop wakes up on this machine",
         ("push bench loop --full-stack", "push bench loop --rate 100 --load --json"),
     ),
+    "bench latency": Command(
+        "tools.bench.latency",
+        "measure the way from a force at the sensor to the command at the base",
+        ("push bench latency", "push bench latency --steps 20 --json"),
+    ),
 }
 
 ACTIONS = {

@@ -281,6 +281,26 @@ def test_reduced_commands_leave_at_once_and_others_every_20_ms(twist, sent, ago_
     assert found == (twist if leaves else None)
 
 
+@pytest.mark.parametrize("twist", [BodyTwist(0.1), BodyTwist(0.11)])
+def test_a_command_waits_for_its_frame_and_does_not_leave_old(twist):
+    """Something else wakes the gate 18 ms after the last command, and control's next frame comes at 20 ms."""
+    state = replace(ROLLING, twist=twist, sent=BodyTwist(0.1), sent_ns=T0, frame_ns=T0 - MS)
+    second = replace(state, frame_ns=T0 + 10 * MS)
+    assert due(second, T0 + 10 * MS) is None
+    assert due(second, T0 + 18 * MS) is None
+    assert due(second, T0 + 19 * MS) is None
+    third = replace(state, frame_ns=T0 + 20 * MS)
+    assert due(third, T0 + 20 * MS) == twist
+    assert due(replace(state, frame_ns=T0 + 18 * MS), T0 + 18 * MS) == twist  # after a tick that was late
+
+
+def test_a_tick_that_does_not_come_leaves_no_gap_in_the_commands():
+    """They are repeated after 30 ms at the latest, until control's silence latches."""
+    state = replace(ROLLING, twist=BodyTwist(0.1), sent=BodyTwist(0.1), sent_ns=T0, frame_ns=T0)
+    assert due(state, T0 + 30 * MS - 1) is None
+    assert due(state, T0 + 30 * MS) == BodyTwist(0.1)
+
+
 def test_before_the_first_frame_nothing_is_sent_unless_it_has_latched():
     assert due(GateState(), T0) is None
     assert due(latched(GateState(), Latch.LINK), T0) == ZERO

@@ -113,7 +113,7 @@ def time_tick_parts(folder: Path) -> dict[str, float]:
         Lockstep(rig, 0, RecordedRun()).run(lambda *_: None)
 
     def without_log() -> None:
-        Lockstep(rig, 0, None).run(lambda *_: None)
+        Lockstep(rig, 0, None, compiled=True).run(lambda *_: None)
 
     def fold() -> None:
         state = TickState()
