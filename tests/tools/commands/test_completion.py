@@ -49,7 +49,7 @@ def completed(script: Path, line: str, cwd: Path) -> list[str]:
         ("push re", ["replay", "report"]),
         ("push study sh", ["show"]),
         ("push study show --wh", ["--where"]),
-        ("push bench ", ["sim", "physics", "loop"]),
+        ("push bench ", ["sim", "physics", "loop", "latency"]),
         ("push log exp", ["export"]),
         ("push run sim --dist", ["--distance-m"]),
         ("push replay --w", ["--what-if"]),
