@@ -31,7 +31,8 @@ STEP_MARGIN = 1.2
 REPEAT_NS = 18_000_000
 """Unchanged or growing commands are sent every 20 ms (less the jitter of a tick); reduced and zero ones at once."""
 FRESH_NS, REPEAT_AT_MOST_NS = 2_000_000, 30_000_000
-"""They leave with a frame that has just come, so that they are not old already, or after 30 ms where none comes."""
+"""They leave with a frame that has just come, so that they are not old already: the next one is awaited, and 2 ms more,
+if it is to come within 30 ms of the last command."""
 CONTACT_MARGIN = 1.001
 """The contact ball may exceed the envelope by this much (rounding in the envelope's scaling)."""
 OVERSPEED_SAMPLES = 3
@@ -153,16 +154,21 @@ def latched(state: GateState, cause: Latch) -> GateState:
     return msgspec.structs.replace(state, latch=state.latch or cause, twist=ZERO)
 
 
-def due(state: GateState, now_ns: int) -> BodyTwist | None:
+def due(limits: EnvelopeLimits, state: GateState, now_ns: int) -> BodyTwist | None:
     """Return the command to send now, or None when nothing is due yet."""
     if state.frame_ns == 0 and not state.latch:
         return None
     wanted = state.twist
-    silent_ns = now_ns - state.sent_ns
-    fresh = state.latch or now_ns - state.frame_ns < FRESH_NS
-    if silent_ns >= REPEAT_NS and (fresh or silent_ns >= REPEAT_AT_MOST_NS):
+    if wanted != state.sent and reduces(wanted, state.sent):
         return wanted
-    return wanted if wanted != state.sent and reduces(wanted, state.sent) else None
+    return wanted if now_ns - state.sent_ns >= REPEAT_NS and not _awaits(limits, state, now_ns) else None
+
+
+def _awaits(limits: EnvelopeLimits, state: GateState, now_ns: int) -> bool:
+    """Return whether a newer command is about to come."""
+    next_ns = state.frame_ns + limits.period_ns
+    old = now_ns - state.frame_ns >= FRESH_NS and not state.latch
+    return old and now_ns < next_ns + FRESH_NS and next_ns <= state.sent_ns + REPEAT_AT_MOST_NS
 
 
 def sent(state: GateState, twist: BodyTwist, now_ns: int) -> GateState:

@@ -167,7 +167,7 @@ class GateShell(msgspec.Struct, frozen=True, gc=False):
 
     def due(self, now_ns: int) -> BodyTwist | None:
         """Return the command to send now, or None when nothing is due yet."""
-        return gate.due(self.gate, now_ns)
+        return gate.due(self.limits, self.gate, now_ns)
 
     def on_sent(self, wanted: BodyTwist, really: BodyTwist | None, now_ns: int) -> GateShell:
         """Record the wanted command and the one actually sent (None: nothing, because the link is lost)."""

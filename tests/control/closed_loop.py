@@ -87,7 +87,7 @@ class ClosedLoop:
         frame = GateFrame(self.gate.seq + 1, self.tick, now_ns, self.output.mode, self.output.command_body)
         self.gate = gate.on_clock(gate.on_frame(self._gate_limits, self.gate, frame, now_ns), now_ns)
         assert not self.gate.latch, (self.tick, self.gate)
-        wanted = gate.due(self.gate, now_ns)
+        wanted = gate.due(self._gate_limits, self.gate, now_ns)
         if wanted is not None:
             self.world.command_base(wanted, now_ns)
             self.gate = gate.sent(self.gate, wanted, now_ns)

@@ -277,7 +277,7 @@ def going(twist, sent, ago_ms):
     ],
 )
 def test_reduced_commands_leave_at_once_and_others_every_20_ms(twist, sent, ago_ms, leaves):
-    found = due(going(twist, sent, ago_ms), T0)
+    found = due(LIMITS, going(twist, sent, ago_ms), T0)
     assert found == (twist if leaves else None)
 
 
@@ -286,24 +286,41 @@ def test_a_command_waits_for_its_frame_and_does_not_leave_old(twist):
     """Something else wakes the gate 18 ms after the last command, and control's next frame comes at 20 ms."""
     state = replace(ROLLING, twist=twist, sent=BodyTwist(0.1), sent_ns=T0, frame_ns=T0 - MS)
     second = replace(state, frame_ns=T0 + 10 * MS)
-    assert due(second, T0 + 10 * MS) is None
-    assert due(second, T0 + 18 * MS) is None
-    assert due(second, T0 + 19 * MS) is None
+    assert due(LIMITS, second, T0 + 10 * MS) is None
+    assert due(LIMITS, second, T0 + 18 * MS) is None
+    assert due(LIMITS, second, T0 + 19 * MS) is None
     third = replace(state, frame_ns=T0 + 20 * MS)
-    assert due(third, T0 + 20 * MS) == twist
-    assert due(replace(state, frame_ns=T0 + 18 * MS), T0 + 18 * MS) == twist  # after a tick that was late
+    assert due(LIMITS, third, T0 + 20 * MS) == twist
+    assert due(LIMITS, replace(state, frame_ns=T0 + 18 * MS), T0 + 18 * MS) == twist  # after a tick that was late
 
 
 def test_a_tick_that_does_not_come_leaves_no_gap_in_the_commands():
-    """They are repeated after 30 ms at the latest, until control's silence latches."""
+    """It is awaited for 2 ms; then the last command is repeated, until control's silence latches."""
+    state = replace(ROLLING, twist=BodyTwist(0.1), sent=BodyTwist(0.1), sent_ns=T0, frame_ns=T0 + 10 * MS)
+    assert due(LIMITS, state, T0 + 22 * MS - 1) is None
+    assert due(LIMITS, state, T0 + 22 * MS) == BodyTwist(0.1)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "leaves_ms"), [(50, 20), (60, 18), (80, 25), (100, 20), (125, 24), (200, 20), (500, 18)]
+)
+def test_at_any_rate_a_command_leaves_within_30_ms_and_not_old(rate_hz, leaves_ms):
+    """In the gate's own rhythm of 0.1 ms, after a command at T0 and a frame in each period from then on."""
+    limits = replace(LIMITS, period_ns=round(1000 / rate_hz * MS))
     state = replace(ROLLING, twist=BodyTwist(0.1), sent=BodyTwist(0.1), sent_ns=T0, frame_ns=T0)
-    assert due(state, T0 + 30 * MS - 1) is None
-    assert due(state, T0 + 30 * MS) == BodyTwist(0.1)
+    for tenth in range(400):
+        now = T0 + tenth * MS // 10
+        if now - state.frame_ns >= limits.period_ns:
+            state = replace(state, frame_ns=now)
+        if due(limits, state, now) is not None:
+            break
+    assert (now - T0) / MS == pytest.approx(leaves_ms, abs=1)
+    assert now - state.frame_ns < 2 * MS
 
 
 def test_before_the_first_frame_nothing_is_sent_unless_it_has_latched():
-    assert due(GateState(), T0) is None
-    assert due(latched(GateState(), Latch.LINK), T0) == ZERO
+    assert due(LIMITS, GateState(), T0) is None
+    assert due(LIMITS, latched(GateState(), Latch.LINK), T0) == ZERO
 
 
 def test_sent_is_what_really_went_out():
@@ -317,7 +334,7 @@ def test_zero_leaves_in_the_moment_of_the_latch_and_goes_on(cause):
     state = replace(latched(going(BodyTwist(0.1), BodyTwist(0.1), 1.0), cause))
     now, zeros = T0, 0
     for _ in range(100):
-        wanted = due(state, now)
+        wanted = due(LIMITS, state, now)
         if wanted is not None:
             assert wanted == ZERO
             state = gate.sent(state, wanted, now)
@@ -336,10 +353,10 @@ def test_control_silent_or_dead_means_zero_within_the_bound_of_the_table():
         state = on_clock(state, now)
     assert now - (T0 + 10 * MS) <= FAULTS["F66"].bound_ticks * 10 * MS
     assert LATCH_FAULT[state.latch] == "F66"
-    assert due(state, now) == ZERO
+    assert due(LIMITS, state, now) == ZERO
     dead = gate.on_eof(ROLLING)  # a killed process closes its end in the same moment
     assert LATCH_FAULT[dead.latch] == "F65"
-    assert due(gate.sent(dead, ROLLING.twist, T0), T0) == ZERO
+    assert due(LIMITS, gate.sent(dead, ROLLING.twist, T0), T0) == ZERO
 
 
 # --- any sequence ------------------------------------------------------------------------------------------------
@@ -393,7 +410,7 @@ def test_over_any_sequence_of_events(events, gaps):
         state = on_clock(state, now)
         if before.latch:
             assert state.latch == before.latch
-        wanted = due(state, now)
+        wanted = due(LIMITS, state, now)
         if wanted is None:
             continue
         assert all(math.isfinite(v) for v in (wanted.vx, wanted.vy, wanted.omega))
@@ -405,7 +422,7 @@ def test_over_any_sequence_of_events(events, gaps):
         out.append(wanted)
     if events and events[-1][0] in ("nonsense", "eof"):
         assert state.latch
-        assert not out or due(replace(state, sent_ns=0), now) == ZERO
+        assert not out or due(LIMITS, replace(state, sent_ns=0), now) == ZERO
 
 
 def test_frames_that_waited_for_the_gate_are_judged_and_only_the_newest_must_be_fresh():
