@@ -194,13 +194,7 @@ class _Walk:
         channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, at)
         if channel_id not in self._channels:
             raise altered(self._path, f"a message of channel {channel_id}, which is not declared")
-        return Message(
-            channel_id=channel_id,
-            sequence=sequence,
-            log_time=log_time,
-            publish_time=publish_time,
-            data=data[at + _MESSAGE.size : at + length],
-        )
+        return Message(channel_id, log_time, data[at + _MESSAGE.size : at + length], publish_time, sequence)
 
     def _schema(self, schema: Schema) -> None:
         named = schema.name[:100]

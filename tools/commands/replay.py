@@ -21,7 +21,7 @@ from tools.replay.result import ReplayResult
 from tools.replay.what_if import what_if
 from tools.run.facts.code_facts import COMMIT_FACT, DIRTY_FACT
 from tools.run.facts.run_facts import code_and_machine
-from tools.terminal.arguments import named_path, number
+from tools.terminal.arguments import named_path, number, whole_number
 
 DIFFERS = ReplayDiffers.exit_code
 
@@ -39,6 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance", type=number(0, 1e6), metavar="X", help="accept differences up to X (log from another machine)"
     )
     parser.add_argument("--ticks", action="store_true", help="the ticks alone: neither the world nor derived topics")
+    parser.add_argument(
+        "--jobs",
+        type=whole_number(1, 1000),
+        default=1,
+        metavar="N",
+        help="with --ticks: re-run them by so many processes; the result is the same (1)",
+    )
     parser.add_argument("--json", action="store_true", help="the result as one line of JSON, last on stdout")
 
 
@@ -47,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     path = find_log(args.log)
     if args.what_if:
         return answer_what_if(path, args)
-    result = replay(path, tolerance=args.tolerance, law=args.law, ticks_only=args.ticks)
+    result = replay(path, tolerance=args.tolerance, law=args.law, ticks_only=args.ticks, jobs=args.jobs)
     for line in lines(result):
         (tell if args.json else print)(printable(line))
     if args.json:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.mcap.files import files_of
 from robot_io.rig.config import RigConfig
 from tools.log.derivation import WORLD_TOPIC
@@ -22,31 +21,48 @@ from tools.replay.base_inputs import FIRST_FORMAT, BaseInputsReplayer
 from tools.replay.derived import DerivedReplay, DerivedReplayer
 from tools.replay.law import law_of, with_law_source
 from tools.replay.result import ReplayResult, all_derived, notes_of
+from tools.replay.shares import ticks_shared
 from tools.replay.ticks import TickReplayer
 from tools.replay.verified_log import VerifiedLog, in_order
 from tools.replay.world import PREFIX, WorldReplayer, WorldTypes
 from tools.run.tick_core import TickCore
 
+WORTH_COMPILING_NS = 60_000_000_000
+"""Loading the compiled kernel of the world takes as long as a minute of pushing saves."""
 
-def replay(path: Path, *, tolerance: float | None = None, law: str = "", ticks_only: bool = False) -> ReplayResult:
+
+def replay(
+    path: Path, *, tolerance: float | None = None, law: str = "", ticks_only: bool = False, jobs: int = 1
+) -> ReplayResult:
     """Replay a log, in one file or in parts. law: `module:Class` of its law where that is not a shipped one.
 
-    ticks_only: neither the world, nor derived topics, nor what arrived. Raises UsageError if there is no such log,
+    ticks_only: neither the world, nor derived topics, nor what arrived. jobs: processes; the result is the same for any
+    number. Raises UsageError if there is no such log,
     LogDamaged if it cannot be trusted, ReplayDiffers if only the code that wrote it can use its config, and as
     `law_of`.
     """
-    return replay_files(files_of(path), tolerance=tolerance, law=law, ticks_only=ticks_only)
+    return replay_files(files_of(path), tolerance=tolerance, law=law, ticks_only=ticks_only, jobs=jobs)
 
 
 def replay_files(
-    files: Sequence[Path], *, tolerance: float | None = None, law: str = "", ticks_only: bool = False
+    files: Sequence[Path],
+    *,
+    tolerance: float | None = None,
+    law: str = "",
+    ticks_only: bool = False,
+    jobs: int = 1,
 ) -> ReplayResult:
     """Replay files that follow each other; the first need not be that of the run. As `replay`."""
     logs = [VerifiedLog(file) for file in files]
     in_order(logs)
     session = _Session(logs[0], tolerance, law, ticks_only=ticks_only)
-    for log in logs:
-        session.take(log)
+    can_share = jobs > 1 and tolerance is None and not law  # a law of one's own is imported here alone
+    shared = ticks_shared(logs, jobs) if can_share and ticks_only else None
+    if shared is not None:
+        session.take_shared(*shared)
+    else:
+        for log in logs:
+            session.take(log)
     result = session.result(logs)
     if not result.different:  # a difference tells more than a changed config
         for log in logs:
@@ -65,14 +81,11 @@ class _Session:
         self._made_by = with_law_source(log.made_by, log.facts, sha256)
         core = TickCore.of(self._rig, in_contact=log.in_contact, law=own)
         self._ticks = TickReplayer(core, tolerance, log.ticks)
-        self._types = WorldTypes(
-            log.type_of("/world/start", START_CDR),
-            log.type_of("/world/command", COMMAND_CDR),
-            log.type_of(WORLD_TOPIC, STATE_CDR),
-        )
+        self._types = WorldTypes.of(log)
         # A world with incomplete records cannot be re-run.
         can_run = not ticks_only and not log.dropped("world")
-        self._world = WorldReplayer(self._rig, self._types, tolerance) if can_run else None
+        long = log.end_ns - log.start_ns > WORTH_COMPILING_NS
+        self._world = WorldReplayer(self._rig, self._types, tolerance, compiled=long) if can_run else None
         known = log.made_by.format >= FIRST_FORMAT and log.ticks.holds_all_of("input.base")
         self._arrived = (
             BaseInputsReplayer(log.wall_offset_ns, log.channels, log.made_by.format, tolerance, since_ns=_since(log))
@@ -81,6 +94,11 @@ class _Session:
         )
         self._derived: list[DerivedReplay] = []
         self._derives = log.facts.get(DERIVED_FACT) != NOT_DERIVED
+
+    def take_shared(self, ticks: int, last: int) -> None:
+        """Take that so many ticks were found identical by others; `last` is the number of the last."""
+        self._ticks.count = self._ticks.identical = ticks
+        self._ticks.last = last
 
     def take(self, log: VerifiedLog) -> None:
         """Re-run and compare one file. Raises LogDamaged."""

@@ -20,6 +20,11 @@ class TickReplayer:
         self.last = -1
         self.first: Difference | None = None
 
+    @property
+    def state(self) -> TickState | None:
+        """The state after the newest tick; None where it is not known."""
+        return self._state
+
     def take(self, tick: ControlTick, payload: bytes) -> None:
         """Re-run and compare one tick."""
         number = tick.input.tick

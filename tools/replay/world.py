@@ -9,12 +9,13 @@ import msgspec
 
 from robot_io.errors import EnvironmentFault
 from robot_io.log.logged_type import LoggedType
-from robot_io.log.world_messages import STATE_CDR, WorldCommand, WorldStart, WorldState
+from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR, WorldCommand, WorldStart, WorldState
 from robot_io.rig.config import RigConfig
 from sim_backend.world.base_plant import GRID_NS
 from sim_backend.world.world import STATE_EVERY_STEPS, World, WorldRecord
 from tools.log.thinned_topics import holds_world_state
 from tools.replay.difference import Difference, difference
+from tools.replay.verified_log import VerifiedLog
 
 PREFIX = "/world/"
 
@@ -34,14 +35,26 @@ class WorldTypes(NamedTuple):
     command: LoggedType[WorldCommand]
     state: LoggedType[WorldState]
 
+    @classmethod
+    def of(cls, log: VerifiedLog) -> WorldTypes:
+        """Return those of a log. Raises LogDamaged where they cannot be read as today's."""
+        return cls(
+            log.type_of("/world/start", START_CDR),
+            log.type_of("/world/command", COMMAND_CDR),
+            log.type_of("/world/state", STATE_CDR),
+        )
+
 
 class WorldReplayer:
-    """Compares the world's records, given in the order of the log."""
+    """Compares the world's records, given in the order of the log. compiled: see `World`."""
 
-    def __init__(self, rig: RigConfig, types: WorldTypes, tolerance: float | None = None) -> None:
+    def __init__(
+        self, rig: RigConfig, types: WorldTypes, tolerance: float | None = None, *, compiled: bool = False
+    ) -> None:
         self._rig = rig
         self._types = types
         self._tolerance = tolerance
+        self._compiled = compiled
         self._world: World | None = None
         self._replayed: deque[WorldState] = deque()
         self._states = self._identical = 0
@@ -55,7 +68,7 @@ class WorldReplayer:
             start = self._types.start.decode(payload)
             self._replayed.clear()
             try:
-                self._world = World(self._rig, start.seed, start.start_ns, self._keep)
+                self._world = World(self._rig, start.seed, start.start_ns, self._keep, compiled=self._compiled)
             except EnvironmentFault:
                 self.engine_missing = True
         elif self._world is None:
