@@ -124,16 +124,7 @@ class Run:
 
     def alive(self) -> dict[int, str]:
         """Return the processes of this run that are left (zombies are not counted), by pid."""
-        needle = f"{MARK}={self.mark}".encode()
-        found = {}
-        for folder in Path("/proc").iterdir():
-            if not folder.name.isdigit():
-                continue
-            with contextlib.suppress(OSError):
-                if needle in (folder / "environ").read_bytes().split(b"\0") and _state(folder) != "Z":
-                    command = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode()
-                    found[int(folder.name)] = command
-        return found
+        return marked(self.mark)
 
     def wait_gone(self, within_s: float) -> None:
         """Wait until no process of this run is left."""
@@ -149,6 +140,20 @@ class Run:
         for pid in self.alive():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
+
+
+def marked(mark: str) -> dict[int, str]:
+    """Return the processes that were started with a mark (zombies are not counted), by pid."""
+    needle = f"{MARK}={mark}".encode()
+    found = {}
+    for folder in Path("/proc").iterdir():
+        if not folder.name.isdigit():
+            continue
+        with contextlib.suppress(OSError):
+            if needle in (folder / "environ").read_bytes().split(b"\0") and _state(folder) != "Z":
+                command = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+                found[int(folder.name)] = command
+    return found
 
 
 def blame_the_host(host: HostWatch, began_ns: int, code: int, err: str) -> None:

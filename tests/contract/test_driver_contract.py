@@ -28,6 +28,8 @@ LEVELS = [
 ]
 ON_THE_WIRE_ONLY = (("ur10e", "sim"), ("ur-tool-force", "sim"))
 """At level sim they are the arm and the sensor that every rig has."""
+LONG = ("ur10e",)
+"""Driven by the class that drives a UR10; what is its own is in tests/robot_io/ur10."""
 if OWN_KIND:
     LEVELS = LEVELS[1:2]
 
@@ -40,7 +42,11 @@ def opened_level(level, device):
 
 def cases(devices=DEVICES):
     return [
-        pytest.param((device, level.values[0]), id=f"{device}-{level.id}", marks=level.marks)
+        pytest.param(
+            (device, level.values[0]),
+            id=f"{device}-{level.id}",
+            marks=[*level.marks, *([pytest.mark.long] if device in LONG else [])],
+        )
         for device in devices
         for level in LEVELS
         if (device, level.values[0]) not in ON_THE_WIRE_ONLY

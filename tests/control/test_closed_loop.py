@@ -6,6 +6,7 @@ import pytest
 
 from robot_io.tick import Phase
 from tests.control.closed_loop import ClosedLoop
+from tests.how_many import mostly_long
 
 QUIET = (
     "world.sensor.noise_force_N=0",
@@ -69,6 +70,7 @@ def test_left_of_the_path_the_pusher_goes_further_out_the_object_turns_and_its_f
     assert all(angle > -0.005 for angle in theta_p[: max(turned - 100, 20)])
 
 
+@pytest.mark.long
 def test_the_wrong_sign_of_k_y_drives_the_object_away(monkeypatch):
     """The same start with the sign that looks right: the object ends further out than it began."""
     import control.push_law
@@ -85,7 +87,7 @@ def test_the_wrong_sign_of_k_y_drives_the_object_away(monkeypatch):
     assert rows[-1][4] > 2.0 * rows[0][4]
 
 
-@pytest.mark.parametrize("direction", [90.0, 180.0, -135.0])
+@pytest.mark.parametrize("direction", mostly_long((90.0, 180.0, -135.0), -135.0))
 def test_any_direction_of_the_path_gives_the_same_push(direction):
     overrides = (*QUIET, "control.distance_m=0.5", "control.retreat_m=0")
     # Without the sensor's counts: a value on the edge between two would fall differently by rounding alone.
@@ -159,7 +161,7 @@ def test_force_feedback_reaches_six_metres(seed, gains):
     assert loop.faults_seen == {}
 
 
-@pytest.mark.parametrize("seed", [0, 7, 13])
+@pytest.mark.parametrize("seed", mostly_long((0, 7, 13), 7))
 def test_open_loop_loses_the_object_before_two_metres(seed):
     loses_the_object(seed)
 
@@ -193,12 +195,15 @@ def test_the_barrel_too(seed):
 @pytest.mark.parametrize(
     ("seed", "line"),
     [
-        (1, {"ft_rate_hz": 63.0}),
-        (2, {"ft_rate_hz": 100.016, "ft_delay_ms": 8.3, "ft_burst_ms": 16}),
-        (3, {"ft_rate_hz": 63.0, "ft_delay_ms": 8.3, "ft_burst_ms": 16}),
-        (4, {"ft_rate_hz": 98.9, "ft_delay_ms": 9.3}),
+        pytest.param(1, {"ft_rate_hz": 63.0}, id="63 Hz", marks=pytest.mark.long),
+        pytest.param(
+            *(2, {"ft_rate_hz": 100.016, "ft_delay_ms": 8.3, "ft_burst_ms": 16}),
+            id="bursts of 16 ms",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(3, {"ft_rate_hz": 63.0, "ft_delay_ms": 8.3, "ft_burst_ms": 16}, id="63 Hz in bursts"),
+        pytest.param(4, {"ft_rate_hz": 98.9, "ft_delay_ms": 9.3}, id="99 Hz, late", marks=pytest.mark.long),
     ],
-    ids=["63 Hz", "bursts of 16 ms", "63 Hz in bursts", "99 Hz, late"],
 )
 def test_no_fault_in_a_clean_run_over_any_line(seed, line):
     loop = ClosedLoop(("control.distance_m=2",), seed, **line)

@@ -11,7 +11,7 @@ from control import contact_threshold
 from control.wrench import median_of_three
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ContactState, ControlState, Phase, TickState
-from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing, with_force
+from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing, ran_to, with_force
 from tests.safety.fold_bench import without_contact as no_force
 from tools.run.tick_core import TickCore
 
@@ -141,7 +141,7 @@ def test_the_force_before_a_contact_is_that_before_its_own_half_second():
 
 def light(newton):
     """Return a bench on the approach to an object that pushes back with so much."""
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     bench.force_path = (newton, 0.0)
     return bench
 
@@ -288,12 +288,12 @@ def test_a_contact_where_it_is_expected_is_not_early_and_follows_no_force():
 
 @pytest.mark.parametrize("expected", [0.3, 0.6])
 def test_a_contact_after_five_centimetres_is_early_where_it_is_expected_after_sixty(expected):
-    bench = FoldBench((f"path.expected_contact_m={expected}",)).run_to(Phase.PUSH)
+    bench = ran_to(Phase.PUSH, (f"path.expected_contact_m={expected}",))
     assert bench.state.control.early_contact == (expected == 0.6)
 
 
 def test_after_the_expected_place_no_contact_is_early():
-    bench = FoldBench(("path.expected_contact_m=0.6",)).run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH, ("path.expected_contact_m=0.6",))
     bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
     bench.fold(lambda inp, _: replace(no_force(inp), operator=2))
     bench.run_to(Phase.PUSH)
@@ -302,7 +302,7 @@ def test_after_the_expected_place_no_contact_is_early():
 
 def test_a_sensor_that_drifts_in_free_air_makes_a_contact_that_says_so():
     """0.25 N/s along the push: contact at 5 N after 20 s, of which the half second before it has 4.9 N."""
-    bench = FoldBench(("path.expected_contact_m=1.2",)).run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH, ("path.expected_contact_m=1.2",))
 
     def drifting(inp, n):
         return with_force(no_force(inp), (BIAS[0], BIAS[1] + 0.001 * (n % 7), BIAS[2] - 0.0025 * n))

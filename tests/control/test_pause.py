@@ -13,10 +13,12 @@ from control.notes.run_notes import RunNotes
 from robot_io.messages import BodyTwist
 from robot_io.tick import Mode, Operator, Phase
 from tests.control.closed_loop import ClosedLoop
-from tests.safety.fold_bench import FoldBench, pushing, with_force, without_contact
+from tests.safety.fold_bench import FoldBench, pushing, ran_to, with_force, without_contact
 
 MINUTE = 6000
 """Ticks of 10 ms."""
+LONG_ENOUGH = pytest.mark.parametrize("ticks", [1000, pytest.param(MINUTE, marks=pytest.mark.long)])
+"""Ten seconds are longer than any deadline that these tests could let run out."""
 CLEAN = 102
 """The second that HOLD takes to clear, and a tick for each mode on the way down."""
 
@@ -41,9 +43,10 @@ def resting(commands):
 # --- what holds, what goes on, phase by phase --------------------------------------------------------------------
 
 
-def test_a_push_holds_at_once_within_its_acceleration_limit_and_goes_on_from_rest():
+@LONG_ENOUGH
+def test_a_push_holds_at_once_within_its_acceleration_limit_and_goes_on_from_rest(ticks):
     bench = pushing()
-    commands = pause(bench, MINUTE)
+    commands = pause(bench, ticks)
     most = bench.rig.limits.max_acceleration_m_per_s2 * 0.01
     speeds = [0.1, *(math.hypot(command.vx, command.vy) for command in commands)]
     assert max(a - b for a, b in pairwise(speeds)) <= most + 1e-9
@@ -75,9 +78,10 @@ def test_the_law_is_not_asked_while_the_base_is_held(monkeypatch):
     assert len(asked) >= 2
 
 
-def test_a_tare_goes_on_and_the_base_holds_before_the_approach():
-    bench = FoldBench().run_to(Phase.TARE)
-    commands = pause(bench, MINUTE)
+@LONG_ENOUGH
+def test_a_tare_goes_on_and_the_base_holds_before_the_approach(ticks):
+    bench = ran_to(Phase.TARE)
+    commands = pause(bench, ticks)
     assert resting(commands) == []
     assert bench.state.control.phase == Phase.APPROACH
     assert bench.state.control.tared
@@ -93,9 +97,9 @@ def test_a_run_paused_before_its_devices_have_spoken_holds_before_the_approach_t
 
 
 def test_an_approach_holds_and_neither_its_way_nor_its_time_is_used_up():
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     bench.run_until(lambda b: b.output.command_body.vx >= 0.02)
-    commands = pause(bench, MINUTE)
+    commands = pause(bench, 1000)
     assert resting(commands[20:]) == []
     motion = bench.state.safety.motion
     again = pause(bench, MINUTE)
@@ -107,7 +111,7 @@ def test_an_approach_holds_and_neither_its_way_nor_its_time_is_used_up():
 
 
 def test_a_hand_on_the_ball_in_a_paused_approach_is_no_contact():
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     hand = lambda inp, n: paused(with_force(inp, (30.0, 0.0, 0.0)) if n < 300 else inp)  # noqa: E731
     pause(bench, 600, hand)
     assert bench.state.control.phase == Phase.APPROACH
@@ -120,13 +124,14 @@ def lost():
     return bench
 
 
-def test_no_time_and_no_way_of_a_lost_contact_runs_out():
-    """2 of the 3 s of the search, a minute of pause, and the last second of it is still there."""
+@LONG_ENOUGH
+def test_no_time_and_no_way_of_a_lost_contact_runs_out(ticks):
+    """2 of the 3 s of the search, a pause, and the last second of it is still there."""
     bench = lost()
     for n in range(200):
         bench.fold(without_contact, n)
     before = bench.state.control
-    pause(bench, MINUTE, paused_without_contact)
+    pause(bench, ticks, paused_without_contact)
     assert bench.state.control.phase == Phase.LOST
     assert bench.state.control.lost_ns == before.lost_ns
     bench.run_until(lambda b: b.output.mode < Mode.HOLD, without_contact, most=CLEAN)
@@ -134,14 +139,15 @@ def test_no_time_and_no_way_of_a_lost_contact_runs_out():
     assert 95 <= left <= 101
 
 
-def test_the_wait_for_the_operator_after_a_loss_does_not_run_out():
-    """1 of its 2 s, a minute of pause: it is still waiting, and a resume still finds it."""
+@LONG_ENOUGH
+def test_the_wait_for_the_operator_after_a_loss_does_not_run_out(ticks):
+    """1 of its 2 s, a pause: it is still waiting, and a resume still finds it."""
     bench = lost()
     bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, without_contact)
     bench.run_until(lambda b: b.state.control.rest_since_ns > 0, without_contact)
     for n in range(100):
         bench.fold(without_contact, n)
-    pause(bench, MINUTE, paused_without_contact)
+    pause(bench, ticks, paused_without_contact)
     assert bench.state.control.phase == Phase.LOST_HOLD
     for n in range(90):
         bench.fold(without_contact, n)
@@ -151,10 +157,11 @@ def test_the_wait_for_the_operator_after_a_loss_does_not_run_out():
     assert bench.state.control.resumes == 1, "of the three, a resume counts and a pause does not"
 
 
-def test_a_retreat_holds_and_ramps_up_again():
-    bench = FoldBench(("control.distance_m=0.1",)).run_to(Phase.RETREAT)
+@LONG_ENOUGH
+def test_a_retreat_holds_and_ramps_up_again(ticks):
+    bench = ran_to(Phase.RETREAT, ("control.distance_m=0.1",))
     bench.run_until(lambda b: b.output.command_body.vx <= -0.02)
-    commands = pause(bench, MINUTE)
+    commands = pause(bench, ticks)
     assert resting(commands[20:]) == []
     assert bench.state.control.phase == Phase.RETREAT
     bench.run_until(lambda b: b.output.mode == Mode.PUSHING, most=CLEAN)
@@ -164,10 +171,10 @@ def test_a_retreat_holds_and_ramps_up_again():
 
 
 def test_coming_to_rest_and_the_last_look_go_on_and_the_base_holds_before_the_retreat():
-    bench = FoldBench(("control.distance_m=0.1",)).run_to(Phase.REST)
+    bench = ran_to(Phase.REST, ("control.distance_m=0.1",))
     pause(bench, 400)
     assert (bench.state.control.phase, bench.output.mode) == (Phase.RETREAT, Mode.HOLD)
-    bench = FoldBench(("control.distance_m=0.1",)).run_to(Phase.CHECK)
+    bench = ran_to(Phase.CHECK, ("control.distance_m=0.1",))
     assert bench.run_until(lambda b: b.output.finished, paused) < 1000
     assert (bench.output.exit_code, bench.state.control.phase) == (0, Phase.DONE)
 

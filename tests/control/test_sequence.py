@@ -11,7 +11,8 @@ from control.sequence import advance, all_devices_sent_data
 from control.settings import Settings
 from robot_io.messages import BodyTwist, Pose2D
 from robot_io.tick import ControlState, Mode, Operator, Phase, TickState
-from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing
+from tests.how_many import mostly_long
+from tests.safety.fold_bench import BIAS, GAP_M, FoldBench, pushing, ran_to
 from tests.safety.fold_bench import without_contact as no_force
 from tools.run.tick_core import TickCore
 
@@ -113,7 +114,7 @@ def test_a_saved_tare_is_kept_after_a_second_at_rest_and_so_are_its_own_joints()
 
 
 def test_the_approach_ramps_up_along_the_path_until_five_samples_of_force():
-    bench = FoldBench(("control.force_filter_tau_s=0",)).run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH, ("control.force_filter_tau_s=0",))
     speeds = []
     while bench.state.control.phase == Phase.APPROACH:
         bench.fold()
@@ -130,7 +131,7 @@ def test_the_approach_ramps_up_along_the_path_until_five_samples_of_force():
 
 def test_no_progress_is_counted_before_the_first_contact():
     """In its first second the approach goes 2.5 cm along the path; none of that is a push."""
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     for _ in range(100):
         bench.fold(no_force)
         assert bench.state.control.progress_m == 0.0
@@ -138,7 +139,7 @@ def test_no_progress_is_counted_before_the_first_contact():
 
 
 def test_four_samples_are_no_contact():
-    bench = FoldBench(("control.force_filter_tau_s=0",)).run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH, ("control.force_filter_tau_s=0",))
     for n in range(40):
         bench.force_path = (15.0, 0.0)
         bench.fold(None if n % 5 else no_force)
@@ -148,14 +149,14 @@ def test_four_samples_are_no_contact():
 
 @pytest.mark.parametrize("force", [(15.0, 0.0), (0.0, 15.0), (-15.0, 0.0)])
 def test_contact_is_a_matter_of_size_not_of_direction(force):
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     bench.force_path = force
     bench.run_to(Phase.PUSH)
     assert bench.state.control.contact_seen
 
 
 def test_an_object_that_is_not_there_ends_the_run_at_rest_with_exit_6():
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     from_x = bench.pose.x
     bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
     # 0.5 m beyond the expected 0.05 m, then braked
@@ -170,7 +171,7 @@ def test_an_object_that_is_not_there_ends_the_run_at_rest_with_exit_6():
 
 
 def test_the_operator_may_look_further():
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     bench.run_until(lambda b: b.state.control.phase == Phase.LOST_HOLD, no_force)
     bench.fold(resume)
     assert bench.state.control.phase == Phase.APPROACH
@@ -183,7 +184,7 @@ def test_the_operator_may_look_further():
 
 
 def test_the_push_ramps_from_the_speed_of_the_approach_in_a_second():
-    bench = FoldBench().run_to(Phase.PUSH)
+    bench = ran_to(Phase.PUSH)
     began = bench.tick
     speeds = []
     while bench.tick < began + 120:
@@ -739,7 +740,7 @@ def test_nor_while_the_loop_skips_ticks_as_it_is_held():
 
 
 def test_an_approach_that_was_held_ramps_up_again():
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     for n in range(60):
         bench.fold(no_force, n)
     for n in range(30):
@@ -775,10 +776,11 @@ def jumped(x=0.0, y=0.0, yaw=0.0):
 
 
 @pytest.mark.parametrize("jump", [{"x": 3.0}, {"x": -3.0}, {"y": 3.0}, {"yaw": 0.07}])
-@pytest.mark.parametrize("samples", [1, 2])
+@pytest.mark.parametrize("samples", mostly_long((1, 2), 2))
 def test_a_pose_that_jumps_is_not_used(jump, samples):
     """Up to two samples in a row are left out (the third stops the run): nothing is steered or reached by them."""
-    bench, same = pushing(), pushing()
+    short = ("control.distance_m=0.5",)
+    bench, same = pushing(short), pushing(short)
     for n in range(samples):
         bench.fold(jumped(**jump), n)
         assert bench.output.faults == ()
@@ -791,11 +793,11 @@ def test_a_pose_that_jumps_is_not_used(jump, samples):
         assert bench.output.command_body.omega == pytest.approx(0.0, abs=1e-4)
     bench.run_until(lambda b: b.output.finished)
     assert bench.output.exit_code == 0
-    assert bench.state.control.end_progress_m >= 2.0
+    assert bench.state.control.end_progress_m >= 0.5
 
 
 def test_a_jump_in_the_approach_is_no_missed_object():
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     bench.fold(jumped(x=1.0))
     assert bench.state.control.phase == Phase.APPROACH
     bench.run_until(lambda b: b.output.finished)

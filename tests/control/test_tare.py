@@ -9,11 +9,11 @@ from control.sensing import counted
 from control.tare import Refusal
 from robot_io.messages import BodyTwist
 from robot_io.tick import Phase
-from tests.safety.fold_bench import BIAS, FoldBench
+from tests.safety.fold_bench import BIAS, ran_to
 
 
 def test_tare_finds_the_bias_with_the_tool_in_it_then_approaches():
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     state = bench.state.control
     assert state.tared
     assert state.bias_force == pytest.approx(BIAS[:3], abs=0.02)
@@ -23,12 +23,12 @@ def test_tare_finds_the_bias_with_the_tool_in_it_then_approaches():
 
 @pytest.mark.parametrize(("seconds", "readings"), [(0.2, 20), (1.0, 100), (2.5, 250)])
 def test_the_tare_lasts_as_long_as_the_rig_says(seconds, readings):
-    bench = FoldBench((f"ft.tare_s={seconds}",)).run_to(Phase.TARE)
+    bench = ran_to(Phase.TARE, (f"ft.tare_s={seconds}",))
     assert bench.run_until(lambda b: b.state.control.phase == Phase.APPROACH) == readings - 1
 
 
 def test_readings_from_before_the_tare_do_not_count():
-    bench = FoldBench().run_to(Phase.TARE)
+    bench = ran_to(Phase.TARE)
 
     def old(inp, _):
         readings = tuple(replace(r, received_ns=bench.state.control.phase_since_ns) for r in inp.ft.readings)
@@ -42,7 +42,7 @@ def test_readings_from_before_the_tare_do_not_count():
 
 
 def test_the_tare_takes_no_more_than_it_asked_for():
-    bench = FoldBench().run_to(Phase.TARE)
+    bench = ran_to(Phase.TARE)
 
     def flood(inp, _):
         one = inp.ft.readings[0]
@@ -55,7 +55,7 @@ def test_the_tare_takes_no_more_than_it_asked_for():
 
 def test_a_base_that_still_moves_is_not_tared_on():
     """Somebody drives the robot by hand while it should be at rest: only the readings after that count."""
-    bench = FoldBench().run_to(Phase.TARE)
+    bench = ran_to(Phase.TARE)
 
     def driven(inp, _):
         return replace(inp, base=replace(inp.base, odometry=BodyTwist(0.05, 0.0, 0.0)))
@@ -88,7 +88,7 @@ def altered(force=None, torque=None):
     ids=["shaking", "drifting", "too much force", "too much torque"],
 )
 def test_a_refused_tare_stays_refused_and_ends_the_run(alter, refusal, fault):
-    bench = FoldBench().run_to(Phase.TARE)
+    bench = ran_to(Phase.TARE)
     bench.run_until(lambda b: b.state.control.refusal != 0, alter)
     assert bench.state.control.refusal == refusal
     assert fault in bench.output.faults
@@ -99,6 +99,6 @@ def test_a_refused_tare_stays_refused_and_ends_the_run(alter, refusal, fault):
 
 
 def test_a_reading_that_is_no_number_stops_the_tare():
-    bench = FoldBench().run_to(Phase.TARE)
+    bench = ran_to(Phase.TARE)
     bench.fold(altered(lambda f, n: (math.nan, f[1], f[2])), 0)
     assert "F10" in bench.output.faults

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.forked_push import forked
 from tests.push_runs import QUICK, pushed
 
 ROOT = Path(__file__).parents[2]
@@ -67,14 +68,14 @@ def test_the_same_sensor_at_level_sim(push, folder, tmp_path):
     assert push(tmp_path, "replay", "out").code == 0
 
 
-def test_its_options_and_limits_are_checked_before_anything_moves(push, folder, tmp_path):
+def test_its_options_and_limits_are_checked_before_anything_moves(folder, state):
     kind = ("--set", f"ft.kind={KIND}")
-    option = push(folder, "run", "emulated", *kind, "--set", "ft.options.gain=2", "--no-report")
+    option = forked(state, "run", "emulated", *kind, "--set", "ft.options.gain=2", "--no-report", cwd=folder)
     assert (option.code, option.err.count("Traceback")) == (2, 0)
     assert "no option `gain`" in option.err
-    torque = push(folder, "config", "check", "emulated", *kind, "--set", "limits.max_torque_Nm=19.9")
+    torque = forked(state, "config", "check", "emulated", *kind, "--set", "limits.max_torque_Nm=19.9", cwd=folder)
     assert torque.code == 0
-    too_high = push(folder, "config", "check", "emulated", *kind, "--set", "limits.max_force_N=181")
+    too_high = forked(state, "config", "check", "emulated", *kind, "--set", "limits.max_force_N=181", cwd=folder)
     assert too_high.code == 2
 
 

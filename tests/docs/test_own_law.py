@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from robot_io.mcap.read import read_log, read_summary
 from robot_io.tick import TICK_CDR, Phase
+from tests.forked_push import forked
 from tests.push_runs import QUICK, pushed
 
 PAGE = (Path(__file__).parents[2] / "docs/own-law.md").read_text(encoding="utf-8")
@@ -27,14 +27,15 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def push(host):
-    return partial(pushed, host=host)
+def push(state):
+    """Run `push` in a folder."""
+    return lambda folder, *argv: forked(state, *argv, cwd=folder)
 
 
 @pytest.fixture(scope="module")
-def simulated(folder, host):
+def simulated(folder, state):
     """Return the page's law's push at level sim."""
-    done = pushed(folder, *SIM, "--out", "simulated", host=host)
+    done = forked(state, *SIM, "--out", "simulated", cwd=folder)
     assert done.code == 0, done.err
     return folder / "simulated"
 
@@ -109,8 +110,9 @@ def test_its_settings_are_checked_and_logged(push, folder):
 
 
 @pytest.mark.long
-def test_an_emulated_run_replays_and_lets_the_law_move_a_robot(push, folder, tmp_path, monkeypatch):
-    done = push(folder, "run", "emulated", "--law", LAW, "--distance-m", "0.2", "--out", "emulated", "--json", *QUICK)
+def test_an_emulated_run_replays_and_lets_the_law_move_a_robot(push, folder, host):
+    argv = ("run", "emulated", "--law", LAW, "--distance-m", "0.2", "--out", "emulated", "--json", *QUICK)
+    done = pushed(folder, *argv, host=host)
     assert (done.code, done.last_object["verdict"]) == (0, "done"), done.err
     assert done.last_object["law"] == LAW
     replay = push(folder, "replay", "emulated", "--law", LAW, "--json")
@@ -120,6 +122,7 @@ def test_an_emulated_run_replays_and_lets_the_law_move_a_robot(push, folder, tmp
     assert any(tick.input.host.law_ns > 0 for tick in ticks), "no step was timed"
 
 
+@pytest.mark.long
 def test_a_comparison_names_both_laws(push, folder, simulated, tmp_path):
     paper = push(folder, "run", "sim", "--fast", "--distance-m", "0.3", "--out", "paper", *QUICK)
     assert paper.code == 0, paper.err

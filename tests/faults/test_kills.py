@@ -18,6 +18,7 @@ from robot_io.log.messages import SAFETY_EVENT
 from robot_io.tick import TICK_CDR
 from safety.faults import FAULTS
 from tests.faults.kill_rounds import Round, pushing, strike, within
+from tests.forked_push import forked
 from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import PUSH, QUICK, ROOT, messages, one_error, stands, started, world_of
 from tools.report.run_data import read_run
@@ -37,11 +38,9 @@ AGAIN = 8
 
 def replays(folder: Path) -> None:
     """Check that the log is whole and folds to itself."""
-    done = subprocess.run(
-        [*PUSH, "replay", str(folder), "--json"], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    result = json.loads(done.stdout)
+    done = forked(folder / "state", "replay", str(folder), "--json")
+    assert done.code == 0, done.out + done.err
+    result = done.last_object
     assert result["ticks"] == result["identical"] > 100
     assert result["world"]["states"] == result["world"]["identical"] > 100
 
@@ -352,6 +351,7 @@ if "tools.run.control_process" in sys.orig_argv:
 """
 
 
+@pytest.mark.long
 def test_control_told_to_end_while_it_opens_the_sensor_leaves_no_stream(state, tmp_path):
     closed = tmp_path / "closed"
     (tmp_path / "sitecustomize.py").write_text(f"CLOSED = {str(closed)!r}\n{TERMINATED_AS_THE_STREAM_BEGINS}")

@@ -9,7 +9,9 @@ import pytest
 
 from robot_io.log.log_format import FORMAT_FACT, LOG_FORMAT
 from robot_io.tick import TICK_CDR, ControlTick, Phase
+from tests.forked_push import forked
 from tests.host_watch import HostWatch, repeated_when_the_host_stalls
+from tests.made_once import made_once
 from tests.push_runs import QUICK, finished
 from tests.replay.runs import as_logged, ticks_in
 from tools.log.run_log import RunLog
@@ -18,7 +20,7 @@ from tools.log.run_log import RunLog
 def short_push(folder: Path, *words: str, host: HostWatch | None = None) -> Path:
     out = folder / "run"
     argv = ("run", *words, *QUICK, "--distance-m", "0.2", "--out", str(out))
-    done = finished(folder / "state", *argv, host=host)
+    done = forked(folder / "state", *argv) if host is None else finished(folder / "state", *argv, host=host)
     assert done.code == 0, done.err
     return out
 
@@ -30,15 +32,18 @@ def sim_run(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def emulated_run(tmp_path_factory) -> Path:
-    found = []
+    def make(folder: Path) -> Path:
+        found = []
 
-    @repeated_when_the_host_stalls
-    def run(tmp_path):
-        found.append(short_push(tmp_path, "emulated", host=host))
+        @repeated_when_the_host_stalls
+        def run(tmp_path):
+            found.append(short_push(tmp_path, "emulated", host=host))
 
-    with contextlib.closing(HostWatch()) as host:
-        run(tmp_path=tmp_path_factory.mktemp("push"))
-    return found[-1]
+        with contextlib.closing(HostWatch()) as host:
+            run(tmp_path=folder)
+        return found[-1]
+
+    return made_once(tmp_path_factory, "emulated_push", make)
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,7 @@ from robot_io.log.seal import LogSeal
 from robot_io.mcap.read import read_summary
 from robot_io.rig.config import rig_from_toml
 from robot_io.tick import TICK_CDR, ControlTick
+from tests.forked_push import forked
 from tools.cli import main
 from tools.run.tick_core import TickCore
 
@@ -31,7 +32,10 @@ Edit = Callable[[Messages], Messages]
 
 
 def push(*argv: object, state: Path, cwd: Path = ROOT, **env: str) -> subprocess.CompletedProcess[str]:
-    """Run `push` in a process of its own, with its own state folder."""
+    """Run `push` in a process of its own, with its own state folder; with `env`, in one that starts with that."""
+    if not env:
+        ended = forked(state, *map(str, argv), cwd=cwd)
+        return subprocess.CompletedProcess(argv, ended.code, ended.out, ended.err)
     environment = os.environ | {"XDG_STATE_HOME": str(state), "PYTHONPATH": str(ROOT), **env}
     words = [sys.executable, "-c", PUSH, *map(str, argv)]
     return subprocess.run(words, cwd=cwd, env=environment, capture_output=True, text=True, timeout=80, check=False)

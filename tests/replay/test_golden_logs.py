@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from robot_io.cdr.schema import type_from_schema
 from robot_io.mcap.read import read_summary
+from tests.how_many import mostly_long
 from tests.replay.runs import changed, replayed, resealed, rewritten
 from tools.cli import main
 
@@ -73,8 +74,7 @@ NEWER = {
     "control.sideways_m",
 }
 """Fields of a tick that these logs do not hold."""
-ALWAYS = ("sim", "sim-format-4-whole")
-MOST_IN_LONG = [name if name in ALWAYS else pytest.param(name, marks=pytest.mark.long) for name in WHOLE]
+MOST_IN_LONG = mostly_long(WHOLE, "sim-arm-drifts")
 CUT_OFF = LOGS / "emulated-cut-off.mcap"
 SAVED = Golden(5014, 352, 427, (), 30)
 """What could be saved of it when it was written."""
@@ -158,7 +158,7 @@ def test_report_makes_a_page_of_it(name, tmp_path, capsys):
         assert fault in text
 
 
-@pytest.mark.parametrize("name", LATER)
+@pytest.mark.parametrize("name", mostly_long(LATER, "sim-format-2", "sim-format-3", "sim-format-4-whole"))
 def test_a_log_of_an_earlier_format_replays_with_all_that_it_held(name, capsys):
     """In format 2 all ticks hold the state before them; up to 3 topics were derived in another way."""
     code, found = replayed(capsys, LOGS / f"{name}.mcap")
@@ -197,7 +197,7 @@ def test_a_state_before_a_tick_that_was_changed_is_found_in_such_a_log(tmp_path,
     assert found["first_difference"]["field"] == "before[0].control.lateral_m"
 
 
-@pytest.mark.parametrize("name", GOLDEN)
+@pytest.mark.parametrize("name", mostly_long(GOLDEN, "emulated", "sim-other-keys", "sim-arm-drifts"))
 def test_replay_verifies_world_topics_and_start_with_the_rig_s_keys_as_they_were_called_then(name, capsys):
     """In two logs the tare's time decides how long the start is: the default would differ."""
     check_replay(capsys, LOGS / f"{name}.mcap", GOLDEN[name], complete=True)

@@ -15,6 +15,7 @@ from robot_io.log.world_messages import COMMAND_CDR, START_CDR, STATE_CDR
 from robot_io.mcap.read import read_summary
 from robot_io.messages import BodyTwist, LinkState, Pose2D, WorldTwist
 from robot_io.tick import ControlTick, Operator
+from tests.how_many import mostly_long
 from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten, with_data, with_input
 from tools.cli import main
 from tools.replay import verified_log
@@ -124,7 +125,7 @@ def flipped(data: bytes, index: int, mask: int) -> bytes:
     return data[:index] + bytes((data[index] ^ mask,)) + data[index + 1 :]
 
 
-@pytest.mark.parametrize("step", [7, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("step", [41, *(pytest.param(step, marks=pytest.mark.long) for step in (7, 1))])
 def test_no_flipped_byte_of_a_tick_passes(step, three_ticks, monkeypatch):
     """Every `step`th byte of the first, a middle and the last tick, one bit each; the file's checksums are right."""
     messages = list(verified_log.read_log(three_ticks))
@@ -202,7 +203,10 @@ ORDERS = {
 }
 
 
-@pytest.mark.parametrize("name", ORDERS)
+@pytest.mark.parametrize(
+    "name",
+    mostly_long(ORDERS, "first removed", "one removed", "last removed", "two swapped", "one doubled", "none left"),
+)
 def test_ticks_removed_swapped_or_doubled_are_an_altered_log(name, sim_log, tmp_path, capsys):
     log = rewritten(sim_log, tmp_path / "run.mcap", ticks_edited(ORDERS[name]))
     code, told = replayed(capsys, log)
@@ -246,7 +250,10 @@ WORLD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", WORLD)
+@pytest.mark.parametrize(
+    "name",
+    mostly_long(WORLD, "seed", "start at the end of times", "a state's force", "last state", "a command", "padding"),
+)
 def test_a_changed_record_of_the_world_does_not_pass(name, sim_log, tmp_path, capsys):
     topic, index, change = WORLD[name]
     log = rewritten(sim_log, tmp_path / "run.mcap", changed(topic, index, change))
@@ -255,7 +262,10 @@ def test_a_changed_record_of_the_world_does_not_pass(name, sim_log, tmp_path, ca
 
 @pytest.mark.parametrize(
     "name",
-    ["a state's force", "a command", "a state's endless time", "start", "start at the end of times", "last state"],
+    mostly_long(
+        ("a state's force", "a command", "a state's endless time", "start", "start at the end of times", "last state"),
+        *("a state's force", "a command", "a state's endless time"),
+    ),
 )
 def test_whoever_mends_the_seal_too_is_found_by_the_world_itself(name, sim_log, tmp_path, capsys):
     topic, index, change = WORLD[name]
@@ -267,7 +277,12 @@ def test_whoever_mends_the_seal_too_is_found_by_the_world_itself(name, sim_log, 
     assert not told["notes"]
 
 
-@pytest.mark.parametrize("topic", ["/world/state", "/world/command", "/world/start", "/gate/sent", "/ft/wrench_raw"])
+@pytest.mark.parametrize(
+    "topic",
+    mostly_long(
+        ("/world/state", "/world/command", "/world/start", "/gate/sent", "/ft/wrench_raw"), "/world/state", "/gate/sent"
+    ),
+)
 def test_a_removed_record_of_any_topic_does_not_pass(topic, sim_log, tmp_path, capsys):
     def edit(messages: Messages) -> Messages:
         at = places(messages, topic)[-1]
@@ -295,7 +310,9 @@ def payloads_exchanged(messages: Messages, at: list[int]) -> Messages:
     return result
 
 
-@pytest.mark.parametrize("topic", ["/ft/wrench_raw", "/gate/sent", "/base/odom", "/world/state"])
+@pytest.mark.parametrize(
+    "topic", mostly_long(("/ft/wrench_raw", "/gate/sent", "/base/odom", "/world/state"), "/gate/sent", "/world/state")
+)
 @pytest.mark.parametrize("edit", [at_another_time, payloads_exchanged])
 def test_what_was_at_one_time_cannot_be_moved_to_another(edit, topic, sim_log, tmp_path, capsys):
     log = rewritten(sim_log, tmp_path / "run.mcap", lambda messages: edit(messages, places(messages, topic)))
@@ -311,7 +328,7 @@ IDLE_SETTINGS = {
 }
 
 
-@pytest.mark.parametrize("name", IDLE_SETTINGS)
+@pytest.mark.parametrize("name", mostly_long(IDLE_SETTINGS, "limit that was not reached", "name"))
 def test_a_changed_setting_that_changes_no_tick_is_an_altered_log(name, sim_log, tmp_path, capsys):
     old, new = IDLE_SETTINGS[name]
     assert old in read_summary(sim_log).attachments["config.toml"].decode()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.how_many import mostly_long
 from tests.replay.older import derived_as
 from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten, with_data
 from tools.cli import main
@@ -34,7 +35,7 @@ def every_other_bit(messages: Messages, topic: str, byte: int) -> Messages:
     return edited
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", mostly_long(LEVELS, "sim_log"))
 @pytest.mark.parametrize(("topic", "field"), [
     ("/base/pose", "pose.orientation.w"), ("/base/odom", "twist.twist.linear.x"), ("/gate/sent", "twist.angular.z"),
 ])  # fmt: skip
@@ -108,7 +109,7 @@ def test_in_a_log_of_an_earlier_format_and_with_a_full_ring_they_are_not_compare
         assert (code, told["arrived"]) == (0, None)
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", mostly_long(LEVELS, "sim_log"))
 def test_memory_is_bounded_and_what_was_forgotten_is_no_difference(level, request, tmp_path, monkeypatch):
     """With room for 50, a log as it was written has all; one sorted by topic can be compared in part only."""
     log = request.getfixturevalue(level)

@@ -13,6 +13,7 @@ from robot_io.log.messages import SAFETY_EVENT, SafetyEvent
 from robot_io.log.ros_messages import Header, ros_time
 from robot_io.rig.config import load_rig, rig_to_toml
 from robot_io.tick import TICK_CDR
+from tests.how_many import mostly_long
 from tests.replay.conftest import short_push
 from tests.replay.runs import Messages, changed, places, replayed, resealed, rewritten, with_data
 from tools.cli import main
@@ -27,8 +28,6 @@ TOPICS = (
     "/safety/event", "/rosout",
 )  # fmt: skip
 FACTS = {FORMAT_FACT: str(LOG_FORMAT)}
-QUICKLY = ("/ft/wrench", "/tf", "/safety/event")
-SOME_TOPICS = [t if t in QUICKLY else pytest.param(t, marks=pytest.mark.long) for t in TOPICS]
 
 
 def first_of(log: Path, capsys) -> tuple[int, dict]:
@@ -42,12 +41,7 @@ def last_byte(data: bytes) -> bytes:
     return data[:-9] + bytes((data[-9] ^ 1,)) + data[-8:]
 
 
-ALWAYS = ("/ft/wrench", "/tf", "/control/signals", "/safety/event")
-
-
-@pytest.mark.parametrize(
-    "topic", [topic if topic in ALWAYS else pytest.param(topic, marks=pytest.mark.long) for topic in TOPICS]
-)
+@pytest.mark.parametrize("topic", mostly_long(TOPICS, "/ft/wrench", "/tf", "/control/signals", "/safety/event"))
 def test_an_edited_message_of_any_derived_topic_is_found_and_named(topic, sim_log, tmp_path, capsys):
     code, told = first_of(resealed(sim_log, tmp_path / "run.mcap", changed(topic, -1, last_byte)), capsys)
     assert code == DIFFERS
@@ -56,6 +50,7 @@ def test_an_edited_message_of_any_derived_topic_is_found_and_named(topic, sim_lo
     assert told["first_difference"]["tick"] > 10**18
 
 
+@pytest.mark.long
 def test_every_wrench_set_to_zero_is_found(sim_log, tmp_path, capsys):
     wrench = BY_TOPIC["/ft/wrench"].cdr_type
 
@@ -76,7 +71,7 @@ def test_every_wrench_set_to_zero_is_found(sim_log, tmp_path, capsys):
     assert "first difference: message at 1" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("topic", SOME_TOPICS)
+@pytest.mark.parametrize("topic", mostly_long(TOPICS, "/safety/event"))
 def test_a_lost_and_a_doubled_message_are_found(topic, sim_log, tmp_path, capsys):
     def lost(messages: Messages) -> Messages:
         at = places(messages, topic)[-1]

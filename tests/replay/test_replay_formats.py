@@ -186,7 +186,9 @@ def test_a_world_with_another_state_is_run_again_and_compared_by_what_both_have(
     assert told["world"]["first_difference"]["field"] == "force_x"
 
 
-@pytest.mark.parametrize("edit", [without(PID), instead(PID, f"{PID}\nfloat64 child_pid_then")])
+@pytest.mark.parametrize(
+    "edit", [without(PID), pytest.param(instead(PID, f"{PID}\nfloat64 child_pid_then"), marks=pytest.mark.long)]
+)
 def test_an_older_log_is_read_by_the_other_commands(edit, older_log, some_ticks, tmp_path, capsys):
     log = older_log(some_ticks, edit, child_pid_then=1.0)
     assert sum(message.topic == "/control/tick" for message in read_log(log)) == 30
@@ -215,7 +217,7 @@ def payload_sum(messages: Messages) -> str:
     return f"{sum(zlib.crc32(topic.encode() + m.data) for topic, m in messages) % 2**32:08x}"
 
 
-@pytest.mark.parametrize("seal", ["payloads", "none"])
+@pytest.mark.parametrize("seal", ["payloads", pytest.param("none", marks=pytest.mark.long)])
 def test_the_seals_of_early_logs_cover_what_they_covered(seal, sim_log, tmp_path, capsys, monkeypatch):
     kept: Messages = []
     early_log = derived_as(sim_log, tmp_path / "early.mcap", 1, monkeypatch)

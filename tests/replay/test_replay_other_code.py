@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from robot_io.log.log_format import LOG_FORMAT
+from tests.how_many import mostly_long
 from tests.replay.runs import changed, replayed, rewritten
 from tools.cli import main
 from tools.replay import verified_log
@@ -62,7 +63,7 @@ MADE = {
 }
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", mostly_long(MADE, "this commit", "no checkout"))
 def test_identical_ticks_verify_with_a_note_of_the_code(name, sim_log, tmp_path, capsys):
     changes, words = MADE[name]
     log = rewritten(sim_log, tmp_path / "run.mcap", metadata=facts(**changes))
@@ -79,7 +80,7 @@ def test_identical_ticks_verify_with_a_note_of_the_code(name, sim_log, tmp_path,
     }
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", mostly_long(MADE, "this commit", "another commit"))
 def test_different_ticks_are_said_to_be_of_other_code_where_they_can_be(name, sim_log, tmp_path, capsys):
     changes, words = MADE[name]
     log = rewritten(sim_log, tmp_path / "run.mcap", metadata=facts(**changes), config=other_gain)

@@ -16,7 +16,8 @@ from msgspec.structs import replace
 
 from robot_io.messages import BodyTwist
 from robot_io.tick import Mode
-from tests.push_runs import QUICK, finished
+from tests.forked_push import forked
+from tests.push_runs import QUICK
 from tests.replay.runs import replayed, ticks_in
 from tools.cli import main
 
@@ -45,7 +46,7 @@ def run_with(tmp_path_factory):
         folder = tmp_path_factory.mktemp("again")
         words = [word for setting in settings for word in ("--set", setting)]
         same = ("run", "sim", "--fast", *QUICK, "--set", "control.distance_m=0.2")
-        finished(folder / "state", *same, *words, "--out", str(folder / "run"))
+        forked(folder / "state", *same, *words, "--out", str(folder / "run"))
         return folder / "run"
 
     return run
@@ -141,9 +142,19 @@ ANSWERED = [
     ("path.expected_contact_m=1.0", ("faults",), "PUSH"),
 ]
 """A setting, parts of which something must differ, and the phase of the log where it first does."""
+ALWAYS = (
+    "control.k_f", "control.distance_m", "ft.tare_s", "limits.slow_force_N", "limits.max_heading_error_deg",
+    "workspace", "path.direction_deg",
+)  # fmt: skip
 
 
-@pytest.mark.parametrize(("setting", "parts", "phase"), ANSWERED, ids=[row[0] for row in ANSWERED])
+@pytest.mark.parametrize(
+    ("setting", "parts", "phase"),
+    [
+        pytest.param(*row, id=row[0], marks=() if row[0].partition("=")[0] in ALWAYS else pytest.mark.long)
+        for row in ANSWERED
+    ],
+)
 def test_settings_of_law_and_safety_are_answered(setting, parts, phase, sim_log, capsys):
     told = what_if(capsys, sim_log, setting)
     assert {part for part in parts if told["parts"][part]["ticks"]} == set(parts)

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.how_many import mostly_long
+
 ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"matplotlib", "scipy", "numba", "numpy", "osqp", "joblib"}
 STAND_IN = "__version__ = '0.10.2'  # of python-control\n"
@@ -147,7 +149,12 @@ def test_importing_it_costs_no_device_and_nothing_heavy():
     assert not loaded & (HEAVY | {"serial", "websockets", "robot_io.ft300.driver", "robot_io.ur10.driver"})
 
 
-@pytest.mark.parametrize("name", ["Ft300", "Ur10", "Ridgeback", "open_device", "rig.load_rig", "mcap.read_log"])
+@pytest.mark.parametrize(
+    "name",
+    mostly_long(
+        ("Ft300", "Ur10", "Ridgeback", "open_device", "rig.load_rig", "mcap.read_log"), "Ft300", "Ur10", "Ridgeback"
+    ),
+)
 def test_no_part_of_it_needs_what_the_application_needs(name):
     room, _, what = name.rpartition(".")
     loaded = loaded_by(f"from robot_io{'.' if room else ''}{room} import {what}")

@@ -11,7 +11,17 @@ from msgspec.structs import replace
 from control.sensing import counted
 from robot_io.messages import BaseStatus, BodyTwist, Pose2D
 from robot_io.tick import ControlState, Operator, Phase, TickInput, TickState
-from tests.safety.fold_bench import BIAS, GAP_M, PERIOD_NS, Alter, FoldBench, pushing, with_force, without_contact
+from tests.safety.fold_bench import (
+    BIAS,
+    GAP_M,
+    PERIOD_NS,
+    Alter,
+    FoldBench,
+    pushing,
+    ran_to,
+    with_force,
+    without_contact,
+)
 from tools.faults.bad_laws import BadLaw, Forgetful, Infinite, Raising, steered_by
 from tools.run.tick_core import TickCore
 
@@ -213,7 +223,7 @@ def object_at(x: float) -> Alter:
 
 
 def taring() -> FoldBench:
-    bench = FoldBench().run_to(Phase.TARE)
+    bench = ran_to(Phase.TARE)
     for _ in range(5):
         bench.fold()
     return bench
@@ -233,7 +243,7 @@ def approaching_too_fast() -> FoldBench:
 
 def approaching_at_full_speed() -> FoldBench:
     """Return a bench on a long approach, at its 0.05 m/s."""
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     for n in range(150):
         bench.fold(without_contact, n)
     return bench
@@ -241,14 +251,14 @@ def approaching_at_full_speed() -> FoldBench:
 
 def just_before_contact(overrides: tuple[str, ...] = (), alter: Alter | None = None) -> FoldBench:
     """Return a bench at the approach's full speed, 1 cm before the object."""
-    bench = FoldBench(overrides).run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH, overrides)
     bench.run_until(lambda b: b.pose.x + 1.0 >= GAP_M - 0.01, alter)
     return bench
 
 
 def touching_backward() -> FoldBench:
     """Return a bench in its first tick of contact, whose sensor says that the object pulls."""
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     bench.force_path = (-15.0, 0.0)
     return bench.run_to(Phase.PUSH)
 
@@ -273,7 +283,7 @@ def in_contact_at_rest() -> FoldBench:
 
 def approaching_in_vain() -> FoldBench:
     """Return a bench whose next tick sees the ball more than 0.5 m beyond the expected contact."""
-    bench = FoldBench().run_to(Phase.APPROACH)
+    bench = ran_to(Phase.APPROACH)
     while bench.pose.x + 1.0 - bench.state.control.approach_from_m <= 0.55:
         bench.fold(without_contact)
     return bench
@@ -283,7 +293,7 @@ def far_on(phase: Phase, after_ticks: int = 0, **changes: float) -> Callable[[],
     """Return a way to a bench that has nearly used up what safety allows this phase."""
 
     def start() -> FoldBench:
-        bench = pushing() if phase == Phase.PUSH else FoldBench().run_to(phase)
+        bench = pushing() if phase == Phase.PUSH else ran_to(phase)
         for _ in range(after_ticks):
             bench.fold()
         motion = replace(bench.state.safety.motion, **changes)
@@ -351,20 +361,20 @@ SERVO = ('arm.hold="servo"',)
 SCENARIOS = [
     # --- start
     Scenario("R01", "no arm", arm(packets=3), FoldBench, warm=500),
-    Scenario("R02", "somebody shakes the tool", shaking, lambda: FoldBench().run_to(Phase.TARE), warm=99),
+    Scenario("R02", "somebody shakes the tool", shaking, lambda: ran_to(Phase.TARE), warm=99),
     Scenario(
         "R03", "something hangs on the tool", reading(force=(0.0, 0.0, 151.0)),
-        lambda: FoldBench(("ft.noise_force_N=0", "ft.noise_torque_Nm=0")).run_to(Phase.TARE), warm=99,
+        lambda: ran_to(Phase.TARE, ("ft.noise_force_N=0", "ft.noise_torque_Nm=0")), warm=99,
         also=frozenset({"R02"}),
     ),
     *(
-        Scenario("R02-dead", f"axis {i}", frozen_axis(i), lambda: FoldBench().run_to(Phase.TARE), warm=99)
+        Scenario("R02-dead", f"axis {i}", frozen_axis(i), lambda: ran_to(Phase.TARE), warm=99)
         for i in range(6)
     ),
     Scenario("R02-dead", "in contact", frozen_axis(4), in_contact_at_rest, warm=99),
     Scenario("R02-contact", "it pulls", pressed(-4.0), in_contact_at_rest, warm=99),
     Scenario("R02-contact", "it lifts", pressed(9.0, upward=5.0), in_contact_at_rest, warm=99),
-    Scenario("R05", "odometry creeps", CREEPS, lambda: FoldBench().run_to(Phase.TARE), warm=500),
+    Scenario("R05", "odometry creeps", CREEPS, lambda: ran_to(Phase.TARE), warm=500),
     Scenario("R04", "arm elsewhere", moved_joint(0.051), FoldBench, warm=19),
     # --- force-torque sensor
     Scenario("F01-slow", "silent", ft(readings=())),
@@ -397,8 +407,8 @@ SCENARIOS = [
     Scenario("F10", "infinite", reading(force=(0.0, -math.inf, 0.0)), also=frozenset({"F52"})),
     Scenario("F10", "torque NaN", reading(torque=(0.0, 0.0, NAN))),
     Scenario("F10", "NaN while taring", reading(force=(0.0, 0.0, NAN)), taring),
-    Scenario("F11", "lifts", pressed(15.0, upward=9.0), lambda: FoldBench().run_to(Phase.PUSH)),
-    Scenario("F11", "presses down", pressed(15.0, upward=-9.0), lambda: FoldBench().run_to(Phase.PUSH)),
+    Scenario("F11", "lifts", pressed(15.0, upward=9.0), lambda: ran_to(Phase.PUSH)),
+    Scenario("F11", "presses down", pressed(15.0, upward=-9.0), lambda: ran_to(Phase.PUSH)),
     Scenario("F11", "pulls", lambda inp, _: inp, touching_backward),
     Scenario("F12-low", "half of the packets", one_of(2)),
     Scenario("F12-hold", "a third of the packets", one_of(3)),
@@ -491,9 +501,9 @@ SCENARIOS = [
     Scenario("F46-approach", "search", without_contact, far_on(Phase.APPROACH, 80, moving_ns=28_195_000_000)),
     Scenario("F46-push", "push", creeping_pose(), far_on(Phase.PUSH, moving_ns=74_595_000_000)),
     Scenario("F46-retreat", "retreat", creeping_pose(), far_on(Phase.RETREAT, 40, moving_ns=6_195_000_000)),
-    Scenario("F59", "aside in the approach", turned_way(20.0, -1.0), lambda: FoldBench().run_to(Phase.APPROACH),
+    Scenario("F59", "aside in the approach", turned_way(20.0, -1.0), lambda: ran_to(Phase.APPROACH),
              warm=85, also=frozenset({"F37"})),
-    Scenario("F59", "aside in the push", turned_way(-20.0, -0.95), lambda: FoldBench().run_to(Phase.PUSH),
+    Scenario("F59", "aside in the push", turned_way(-20.0, -0.95), lambda: ran_to(Phase.PUSH),
              warm=20, also=frozenset({"F37"})),
     Scenario("F52-refused", "a fourth time", then(operator(Operator.RESUME), without_contact), resumed_three_times,
              also=frozenset({"F52-hold"})),

@@ -49,6 +49,12 @@ class FoldBench:
         self.force_path = (15.0, 0.0)
         """Force on the object once it is touched, N."""
 
+    def copy(self) -> FoldBench:
+        """Return another bench that stands where this one does."""
+        other = FoldBench.__new__(FoldBench)
+        other.__dict__.update(self.__dict__)  # all of its values are frozen
+        return other
+
     def good_input(self) -> TickInput:
         """Return what the core sees when all is well."""
         count = self.tick + 1
@@ -167,8 +173,16 @@ def _pushing(overrides: tuple[str, ...]) -> FoldBench:
     return FoldBench(overrides).at_full_speed()
 
 
+@cache
+def _ran_to(phase: Phase, overrides: tuple[str, ...]) -> FoldBench:
+    return FoldBench(overrides).run_to(phase)
+
+
 def pushing(overrides: tuple[str, ...] = ()) -> FoldBench:
     """Return a fresh bench that pushes at full speed without a fault."""
-    ready, copy = _pushing(overrides), FoldBench(overrides)
-    copy.__dict__.update(ready.__dict__)
-    return copy
+    return _pushing(overrides).copy()
+
+
+def ran_to(phase: Phase, overrides: tuple[str, ...] = ()) -> FoldBench:
+    """Return a fresh bench that came to `phase` with good inputs."""
+    return _ran_to(phase, overrides).copy()

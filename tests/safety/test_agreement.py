@@ -4,6 +4,7 @@ The numbers are those of docs/safety.md: a frozen or mirrored pose within 0.15 m
 """
 
 import math
+from functools import cache
 
 import pytest
 from hypothesis import given
@@ -13,6 +14,7 @@ from msgspec.structs import replace
 from robot_io.messages import BaseRecord, BodyTwist, Pose2D
 from robot_io.tick import MotionMark, Phase
 from safety.checks import agreement_checks
+from tests.how_many import mostly_long
 from tests.safety.fault_scenarios import base, shifted_pose, then
 from tests.safety.fold_bench import FoldBench, without_contact
 from tests.safety.normal_pushes import Nothing
@@ -27,6 +29,12 @@ NAMES = {"F37", "F43", "F33-way"}
 
 def moving(name: str) -> tuple[FoldBench, object]:
     """Return a bench at full speed, some way after the speed was reached, and how it goes on."""
+    bench, goes_on = _moving(name)
+    return bench.copy(), goes_on
+
+
+@cache
+def _moving(name: str) -> tuple[FoldBench, object]:
     bench = FoldBench(SPEEDS[name])
     if name.startswith("approach"):
         bench.run_to(Phase.APPROACH)
@@ -172,7 +180,7 @@ def test_a_base_that_goes_another_way_than_sent_is_caught_within_30_centimetres_
     assert way_m <= 0.3 or time_s <= 3.0
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", mostly_long(range(4), 0))
 def test_a_quarter_too_slow_is_caught_within_3_seconds_in_spite_of_noise(seed):
     rig = with_faults(
         resolve_rig("sim", ("control.distance_m=1.5", "ft.tare_s=1")), ("base.command.scaled=0.75 at 6 s",)
@@ -190,6 +198,7 @@ def quiet(seed, *overrides):
     return [row for row in ended["fault_counts"] if row.startswith(ours)], ended["exit_code"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("slip", [0, 0.03, 0.1])
 def test_a_normal_push_meets_none_of_these(slip):
     found = quiet(5, f"world.slip={slip}", "world.floor.patch_strength=0.3", "control.distance_m=0.8")

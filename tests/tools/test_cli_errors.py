@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from robot_io import errors
+from tests.forked_push import forked
 from tools import cli
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -193,12 +194,12 @@ def test_config_show_json_is_one_object_on_one_line():
     assert answer["rig"]["ft"]["level"] == "sim"
 
 
-def test_config_show_prints_a_rig_that_can_be_used_again(tmp_path):
+def test_config_show_prints_a_rig_that_can_be_used_again(tmp_path, state):
     done = push("config", "show", "barrel")
     copy = tmp_path / "copy.toml"
     copy.write_text(done.stdout, encoding="utf-8")
-    assert push("config", "show", str(copy)).stdout == done.stdout
-    assert push("config", "check", str(copy)).returncode == 0
+    assert forked(state, "config", "show", str(copy)).out == done.stdout
+    assert forked(state, "config", "check", str(copy)).code == 0
 
 
 def test_config_check_of_a_bad_rig(tmp_path):

@@ -102,7 +102,7 @@ def test_nothing_is_left_of_a_run_that_was_refused(folder, capsys):
     ("law", "fault", "words"),
     [
         ("Raising", "F57", "the law: ZeroDivisionError: division by zero"),
-        ("Halves", "F57", "`n` of its state is a float, not int"),
+        pytest.param("Halves", "F57", "`n` of its state is a float, not int", marks=pytest.mark.long),
         ("Sleeping", "F57-slow", "limit 1 ms"),
         ("Nowhere", "F58", "not a number"),
     ],

@@ -1,6 +1,6 @@
 """Runs an emulated bridge in a process of its own and tells the test, on request, what the base heard.
 
-As a program: JSON lines in (`{"do": "freeze", "args": [3]}`, `{"do": "report"}`), JSON lines out.
+There: JSON lines in (`{"do": "freeze", "args": [3]}`, `{"do": "report"}`), JSON lines out.
 """
 
 from __future__ import annotations
@@ -8,11 +8,8 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -23,12 +20,10 @@ from robot_io.rig.topics import TopicsConfig
 from sim_backend.ridgeback.faults import BridgeFaults
 from sim_backend.ridgeback.settings import BridgeSettings, RidgebackSettings
 from sim_backend.ridgeback.standalone import StandaloneBase, standalone_emulator
+from tests.forked import Forked
 
-ROOT = Path(__file__).parents[2]
 
-
-def serve() -> None:
-    options = json.loads(sys.argv[1])
+def serve(options: dict[str, Any]) -> None:
     settings = msgspec.convert(options.get("settings", {}), RidgebackSettings)
     bridge = msgspec.convert(options.get("bridge", {}), BridgeSettings)
     loop = EventLoop()
@@ -92,7 +87,7 @@ def serve() -> None:
 class Bridge:
     """A running emulator."""
 
-    def __init__(self, process: subprocess.Popen[str]) -> None:
+    def __init__(self, process: Forked) -> None:
         self.process = process
         self.url: str = self._read()["url"]
 
@@ -107,13 +102,10 @@ class Bridge:
         return [tuple(entry) for entry in self.report()["heard"]]
 
     def _ask(self, order: dict[str, Any]) -> dict[str, Any]:
-        assert self.process.stdin is not None
         self.process.stdin.write(json.dumps(order) + "\n")
-        self.process.stdin.flush()
         return self._read()
 
     def _read(self) -> dict[str, Any]:
-        assert self.process.stdout is not None
         line = self.process.stdout.readline()
         assert line, "the emulator has ended"
         answer: dict[str, Any] = json.loads(line)
@@ -127,27 +119,8 @@ def running_bridge(
     settings = dict(settings or {})
     if topics is not None:
         settings["topics"] = msgspec.to_builtins(topics)
-    process = subprocess.Popen(
-        [sys.executable, str(Path(__file__)), json.dumps({"settings": settings, "bridge": bridge or {}})],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
-    try:
+    with Forked(serve, {"settings": settings, "bridge": bridge or {}}) as process:
         yield Bridge(process)
-    finally:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.close()
-        try:
-            process.wait(5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        process.stdout.close()
 
 
 def until(condition: Callable[[], bool], seconds: float = 5.0, every_s: float = 0.005) -> bool:
@@ -158,7 +131,3 @@ def until(condition: Callable[[], bool], seconds: float = 5.0, every_s: float = 
             return False
         time.sleep(every_s)
     return True
-
-
-if __name__ == "__main__":
-    serve()

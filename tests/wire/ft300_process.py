@@ -1,4 +1,4 @@
-"""An FT 300 emulator in a process of its own, for tests; also the program of that process.
+"""An FT 300 emulator in a process of its own, for tests; also what runs in that process.
 
     with ft300_process(latency_ms=16, knobs={"ack": False}) as emulator:
         Ft300(emulator.port)
@@ -13,18 +13,15 @@ import contextlib
 import json
 import os
 import select
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.ft300.knobs import Ft300Knobs
+from tests.forked import Forked
 
-ROOT = Path(__file__).parents[2]
 START_LIMIT_S = 20.0
 
 WRENCH = (12.34, -56.78, 100.0, 0.1, -1.23, 3.21)
@@ -52,23 +49,20 @@ class Pressed:
 
 
 class EmulatorProcess:
-    def __init__(self, process: subprocess.Popen[str]) -> None:
+    def __init__(self, process: Forked) -> None:
         self._process = process
         self.pid = process.pid
         self.port = str(self._answer()["port"])
 
     def ask(self, command: str, *args: Any) -> dict[str, Any]:
         """Send a command; return its answer."""
-        assert self._process.stdin is not None
         self._process.stdin.write(json.dumps([command, *args]) + "\n")
-        self._process.stdin.flush()
         return self._answer()
 
     def counters(self) -> dict[str, int]:
         return self.ask("counters")
 
     def _answer(self) -> dict[str, Any]:
-        assert self._process.stdout is not None
         ready, _, _ = select.select([self._process.stdout], [], [], START_LIMIT_S)
         line = self._process.stdout.readline() if ready else ""
         assert line, "the emulator process gave no answer"
@@ -79,27 +73,8 @@ class EmulatorProcess:
 @contextlib.contextmanager
 def ft300_process(**options: Any) -> Iterator[EmulatorProcess]:
     """Run an emulator; options as of `Ft300Emulator`, plus `wrench`, `ramp` and `knobs` (a dict)."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tests.wire.ft300_process", json.dumps(options)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        bufsize=1,
-        cwd=ROOT,
-    )
-    try:
+    with Forked(main, options) as process:
         yield EmulatorProcess(process)
-    finally:
-        assert process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.close()
-        try:
-            process.wait(5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        assert process.stdout is not None
-        process.stdout.close()
 
 
 def until(condition: Any, limit_s: float = 5.0, pause_s: float = 0.002) -> bool:
@@ -139,7 +114,3 @@ def main(options: dict[str, Any]) -> None:
     loop.run()
     emulator.close()
     loop.close()
-
-
-if __name__ == "__main__":
-    main(json.loads(sys.argv[1]))

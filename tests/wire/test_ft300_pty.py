@@ -16,6 +16,7 @@ from robot_io.ipc.event_loop import EventLoop
 from sim_backend.ft300.emulator import Ft300Emulator
 from sim_backend.ft300.pty import PtyPort
 from sim_backend.ft300.standalone import ConstantWrench
+from tests.how_many import mostly_long
 from tests.wire.ft300_process import ft300_process, until
 
 PACKET = bytes.fromhex("20 4E D2 04 D2 E9 10 27 64 00 32 FB 8A 0C 0C 17")
@@ -108,6 +109,7 @@ def test_requests_glued_to_a_long_backlog_of_stop_bytes_are_answered():
         os.close(fd)
 
 
+@pytest.mark.long
 def test_a_backlog_greater_than_the_queue_waits_in_the_kernel():
     with ft300_process() as emulator:
         fd = open_port(emulator.port)
@@ -166,7 +168,7 @@ def test_after_a_stop_it_is_deaf_for_a_while_and_answers_then():
         os.close(fd)
 
 
-@pytest.mark.parametrize("unknown", ["exception", "silence"])
+@pytest.mark.parametrize("unknown", mostly_long(("exception", "silence"), "exception"))
 def test_unknown_registers_are_refused_or_met_with_silence(unknown):
     with ft300_process(knobs={"unknown": unknown}) as emulator:
         fd = open_port(emulator.port)

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from tests.how_many import mostly_long
 from tests.wire.ft300_process import ft300_process, until
 from tests.wire.test_ft300_pty import FIRMWARE, PACKET, READ_FIRMWARE, START, open_port, read_for
 
@@ -34,7 +35,7 @@ def stream_again(path: str) -> None:
     os.close(fd)
 
 
-@pytest.mark.parametrize(("latency_ms", "fewest"), [(1, 20), (16, 19)])
+@pytest.mark.parametrize(("latency_ms", "fewest"), [pytest.param(1, 20, marks=pytest.mark.long), (16, 19)])
 def test_a_stop_then_a_new_connection_then_a_question(latency_ms, fewest):
     with ft300_process(latency_ms=latency_ms) as emulator:
         answers = []
@@ -58,6 +59,7 @@ def test_bytes_take_their_time_although_the_port_is_closed_meanwhile():
         os.close(fd)
 
 
+@pytest.mark.long
 def test_a_port_that_stays_closed_still_sends_everything():
     with ft300_process(streaming=True, knobs={"stop_bytes": 6000}) as emulator:
         fd = open_port(emulator.port)
@@ -69,7 +71,7 @@ def test_a_port_that_stays_closed_still_sends_everything():
         assert time.monotonic() - sent_s > 6000 / BYTES_PER_S
 
 
-@pytest.mark.parametrize("latency_ms", [1, 16])
+@pytest.mark.parametrize("latency_ms", mostly_long((1, 16), 16))
 def test_what_arrived_before_a_port_was_opened_is_not_delivered_after_it(latency_ms):
     """Each packet of the ramp carries its own number."""
     with ft300_process(streaming=True, ramp=True, latency_ms=latency_ms) as emulator:

@@ -32,6 +32,7 @@ def test_a_wrong_type_is_named_by_a_bridge_that_starts():
             Ridgeback(bridge.url, topics=topics).open()
 
 
+@pytest.mark.long
 def test_answers_that_take_longer_than_a_second_count():
     with running_bridge(bridge={"answer_delay_s": 1.4}) as bridge, Ridgeback(bridge.url, topics=QUICK) as base:
         assert base.health().counters["unanswered_checks"] == 0

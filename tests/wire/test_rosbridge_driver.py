@@ -376,6 +376,7 @@ def test_the_offset_of_the_robot_s_clock_is_told_with_how_well_it_is_known(ahead
     assert 0.0 < offset.within_s < 0.1
 
 
+@pytest.mark.long
 def test_without_rosapi_the_offset_of_the_clock_is_not_known():
     with running_bridge({}, {"rosapi": False}) as bridge:
         base = Ridgeback(bridge.url, topics=TOPICS)

@@ -96,6 +96,7 @@ def test_a_frozen_bridge_gives_the_base_nothing_old_to_move_by(bridge: Bridge):
     assert until(lambda: bridge.report()["clients"] == 0)
 
 
+@pytest.mark.long
 def test_the_same_freeze_bursts_for_a_client_without_these_precautions(bridge: Bridge):
     # The hazard is real in the emulator, or the test above would prove nothing.
     naive = websocket.create_connection(bridge.url, timeout=1)
@@ -225,7 +226,9 @@ def test_nothing_that_moves_is_sent_when_nobody_drained_for_long(bridge: Bridge)
         assert base.health().counters["held_back"] == 0
 
 
-@pytest.mark.parametrize(("fault", "kind"), [("occlude_base", BasePose), ("occlude_slider", SliderPose)])
+@pytest.mark.parametrize(
+    ("fault", "kind"), [pytest.param("occlude_base", BasePose, marks=pytest.mark.long), ("occlude_slider", SliderPose)]
+)
 def test_occlusion_leaves_the_pose_out_and_keeps_the_link(bridge: Bridge, fault, kind):
     with Ridgeback(bridge.url, topics=TopicsConfig(status="", slider_pose=DEFAULT_SLIDER_TOPIC)) as base:
         samples = []
@@ -278,6 +281,7 @@ def test_lag_shows_in_the_stamps(bridge: Bridge):
         assert base.health().state == LinkState.UP
 
 
+@pytest.mark.long
 def test_poses_that_jitter_come_late_by_different_times_and_in_order():
     with running_bridge({"mocap_jitter_s": 0.008}) as bridge, Ridgeback(bridge.url, topics=TOPICS) as base:
         poses: list[Stamped[BaseFeed]] = []

@@ -155,6 +155,7 @@ def test_what_an_operator_should_know():
     assert decode_publishers(b'{"publishers": ["/teleop"]}') == ["/teleop"]
 
 
+@pytest.mark.long
 def test_without_rosapi_that_is_said():
     with running_bridge(bridge={"rosapi": False}) as bridge, contextlib.closing(Ridgeback(bridge.url)) as base:
         (remark,) = base.open().remarks

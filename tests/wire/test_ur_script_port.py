@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.how_many import mostly_long
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
 PLAYING, STOPPED, PAUSED = 2, 1, 4
@@ -40,7 +41,7 @@ def runtime(robot) -> int:
     return robot.get("controller.runtime_state")
 
 
-@pytest.mark.parametrize("port", [30001, 30002, 30003])
+@pytest.mark.parametrize("port", mostly_long((30001, 30002, 30003), 30001))
 def test_a_program_plays_until_stopped(robot, port: int) -> None:
     upload(robot.host, "def hello():\n  while True:\n    sync()\n  end\nend\n", port)
     wait_until(lambda: runtime(robot) == PLAYING, "it plays")
@@ -115,7 +116,7 @@ def test_a_stop_before_the_start_refuses_the_program(robot) -> None:
     assert robot.get("counters.programs_started") == 0
 
 
-@pytest.mark.parametrize("offset", [1, 47, 1000])
+@pytest.mark.parametrize("offset", mostly_long((1, 47, 1000), 1000))
 def test_a_register_offset_that_no_script_has_is_taken_as_none(robot, offset: int) -> None:
     upload(robot.host, control_script(offset))
     wait_until(lambda: robot.get("controller.registers.int_out")[0] == 1, "ready on the lower registers")
@@ -185,7 +186,7 @@ def test_servo_target_is_followed_and_held_without_further_commands(robot, regis
 
 
 @pytest.mark.parametrize("number", [MOVE_J, SPEED_J, SERVO_J])
-@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e308, -1e308])
+@pytest.mark.parametrize("value", mostly_long((float("inf"), float("nan"), 1e308, -1e308), 1e308))
 def test_a_joint_stays_within_its_range_whatever_is_commanded(robot, number: int, value: float) -> None:
     """A move is cut to the range; a speed or a target to be followed at once is beyond what a joint does."""
     upload(robot.host, control_script(0))

@@ -5,11 +5,11 @@ import json
 import os
 import select
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterable
 from typing import Any
+
+from tests.forked import Forked
 
 READY_WITHIN_S = 10.0
 _next_address = 0
@@ -39,12 +39,7 @@ class EmulatorProcess:
 
     def __init__(self, host: str | None = None, **options: Any) -> None:
         self.host = host or fresh_address()
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.wire.ur_process", json.dumps({"host": self.host, **options})],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
+        self._process = Forked(serve, {"host": self.host, **options})
         assert self._read() == "ready"
 
     def call(self, name: str, *args: Any) -> Any:
@@ -66,10 +61,7 @@ class EmulatorProcess:
     def kill(self) -> None:
         """SIGKILL and reap; idempotent."""
         self._process.kill()
-        for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
-            if stream is not None:
-                stream.close()
-        self._process.wait()
+        self._process.close()
 
     def __enter__(self) -> "EmulatorProcess":
         return self
@@ -78,23 +70,19 @@ class EmulatorProcess:
         self.kill()
 
     def _ask(self, question: dict[str, Any]) -> Any:
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps(question).encode() + b"\n")
-        self._process.stdin.flush()
+        self._process.stdin.write(json.dumps(question) + "\n")
         return self._read()
 
     def _read(self) -> Any:
-        assert self._process.stdout is not None
         readable, _, _ = select.select([self._process.stdout], [], [], READY_WITHIN_S)
-        line = self._process.stdout.readline() if readable else b""
+        line = self._process.stdout.readline() if readable else ""
         if not line:
             self._process.kill()
-            assert self._process.stderr is not None
-            raise AssertionError(f"the emulator gave no answer: {self._process.stderr.read().decode()}")
+            raise AssertionError("the emulator gave no answer")
         return json.loads(line)
 
 
-def main() -> None:
+def serve(options: dict[str, Any]) -> None:
     """Serve one emulator until stdin ends."""
     from robot_io.ipc.event_loop import EventLoop
     from sim_backend.ft300.standalone import ConstantWrench
@@ -103,7 +91,6 @@ def main() -> None:
     from sim_backend.ur10.standalone import StillArm
 
     ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # die with the test
-    options = json.loads(sys.argv[1])
     if "version" in options:
         options["version"] = tuple(options["version"])
     if "model" in options:
@@ -140,7 +127,3 @@ def main() -> None:
     say("ready")
     loop.run()
     emulator.close()
-
-
-if __name__ == "__main__":
-    main()

@@ -20,6 +20,7 @@ import serial
 from robot_io.errors import DeviceError, DeviceNotReady, DeviceProtocolError, DeviceUnreachable
 from robot_io.ft300.driver import Ft300
 from robot_io.messages import LinkState
+from tests.how_many import mostly_long
 from tests.wire.ft300_process import ft300_process, until
 
 PACKET = bytes.fromhex("20 4E D2 04 D2 E9 10 27 64 00 32 FB 8A 0C 0C 17")
@@ -69,7 +70,14 @@ def echoing(sensor_port):
         os.close(theirs)
 
 
-@pytest.mark.parametrize("fault", ["corrupt_every", "drop_byte_every", "insert_byte_every", "drop_packet_every"])
+@pytest.mark.parametrize(
+    "fault",
+    mostly_long(
+        ("corrupt_every", "drop_byte_every", "insert_byte_every", "drop_packet_every"),
+        "corrupt_every",
+        "drop_byte_every",
+    ),
+)
 def test_every_seventh_packet_bad_costs_those_only(fault):
     with ft300_process(ramp=True, knobs={fault: 7}) as emulator, Ft300(emulator.port) as sensor:
         got = numbers(collect(sensor, 40))
@@ -141,7 +149,7 @@ def test_line_dying_while_opening_is_unreachable():
             thread.join()
 
 
-@pytest.mark.parametrize("streaming", [False, True])
+@pytest.mark.parametrize("streaming", mostly_long((False, True), False))
 def test_an_adapter_that_echoes_is_named(streaming):
     """A two-wire RS-485 adapter whose receiver stays on while it sends."""
     with ft300_process(streaming=streaming) as emulator, echoing(emulator.port) as port:

@@ -19,6 +19,7 @@ from robot_io.errors import DeviceError, DeviceNotReady, DeviceProtocolError, De
 from robot_io.ft300 import serial_link
 from robot_io.ft300.driver import Ft300
 from robot_io.messages import LinkState
+from tests.how_many import mostly_long
 from tests.wire.ft300_process import ft300_process, until
 
 WRENCH = (12.34, -56.78, 100.0, 0.1, -1.23, 3.21)
@@ -81,7 +82,7 @@ def test_identity_wrench_stamps_and_modbus_mode_afterwards():
             assert values(collect(again, 1)[0]) == WRENCH
 
 
-@pytest.mark.parametrize("latency_ms", [0, 1, 16])
+@pytest.mark.parametrize("latency_ms", mostly_long((0, 1, 16), 16))
 def test_every_packet_arrives_at_every_latency_timer(latency_ms):
     with ft300_process(latency_ms=latency_ms, ramp=True, streaming=True) as emulator, Ft300(emulator.port) as sensor:
         samples = collect(sensor, 40)
@@ -124,7 +125,13 @@ def test_a_wake_up_is_the_end_of_a_packet_also_after_reading_in_the_middle_of_on
         assert sensor.health().counters["crc_fail"] == 0
 
 
-@pytest.mark.parametrize("knobs", [{"ack_delay_ms": 5.0}, {"ack_delay_ms": 15.0}, {"ack": False}], ids=str)
+@pytest.mark.parametrize(
+    "knobs",
+    mostly_long(
+        ({"ack_delay_ms": 5.0}, {"ack_delay_ms": 15.0}, {"ack": False}), {"ack_delay_ms": 15.0}, {"ack": False}
+    ),
+    ids=str,
+)
 def test_acknowledgement_early_late_and_never(knobs):
     with ft300_process(knobs=knobs) as emulator, Ft300(emulator.port) as sensor:
         assert values(collect(sensor, 5)[-1]) == WRENCH
@@ -309,7 +316,11 @@ class Imposter:
 
 
 @pytest.mark.parametrize(
-    "answer", [bytes.fromhex("09 83 02 41 33"), b"READY\r\n\r\n", bytes.fromhex("01 03 02 46 54 6A 1A 00 00 00 00")]
+    "answer",
+    mostly_long(
+        (bytes.fromhex("09 83 02 41 33"), b"READY\r\n\r\n", bytes.fromhex("01 03 02 46 54 6A 1A 00 00 00 00")),
+        bytes.fromhex("09 83 02 41 33"),
+    ),
 )
 def test_a_device_that_answers_otherwise_is_named_as_such(answer):
     with Imposter(answer) as imposter:

@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+from tests.how_many import mostly_long
+
 CODE = """
 import sys, time
 from robot_io.ipc.deadman import Deadman
@@ -36,7 +38,7 @@ def ask(process, word):
     assert process.stdout.readline() == "done\n"
 
 
-@pytest.mark.parametrize("frozen", [False, True])
+@pytest.mark.parametrize("frozen", mostly_long((False, True), True))
 def test_killed_when_it_renews_no_more(process, frozen):
     ask(process, "renew")
     began_s = time.monotonic()

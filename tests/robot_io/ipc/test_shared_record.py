@@ -8,6 +8,7 @@ import time
 import pytest
 
 from robot_io.ipc.record import SLOTS, SharedRecord
+from tests.how_many import mostly_long
 
 WRITER = """
 import select, sys
@@ -129,7 +130,7 @@ def hammered(payload_size: int, enough: int) -> None:
         record.close()
 
 
-@pytest.mark.parametrize("payload_size", [8, 304, 4096])
+@pytest.mark.parametrize("payload_size", mostly_long((8, 304, 4096), 304))
 def test_two_processes_and_no_torn_record(payload_size):
     hammered(payload_size, 20_000)
 

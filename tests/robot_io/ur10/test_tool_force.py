@@ -10,6 +10,7 @@ from robot_io.errors import ConfigError, DeviceNotReady, DeviceProtocolError
 from robot_io.messages import LinkState
 from robot_io.ur10.driver import Ur10
 from robot_io.ur10.tool_force import UrToolForce
+from tests.how_many import mostly_long
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
 READING = (1.0, 2.0, -15.0, 0.1, 0.2, 0.3)
@@ -127,7 +128,9 @@ def test_zeroing_is_noticed_without_raw_readings_too() -> None:
         wait_until(lambda: sensor.drain() and sensor.health().counters["bias_jumps"] == 1, "it is noticed")
 
 
-@pytest.mark.parametrize("fault", ["close_clients", "reset_clients", "close_rtde_clients"])
+@pytest.mark.parametrize(
+    "fault", mostly_long(("close_clients", "reset_clients", "close_rtde_clients"), "close_clients")
+)
 def test_a_closed_connection_is_lost_for_good(robot, sensor, fault: str) -> None:
     newest(sensor)
     robot.call(fault)

@@ -14,6 +14,7 @@ from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import ArmState, LinkState
 from robot_io.ur10.driver import ArmLink, Ur10, spawn_arm
 from robot_io.ur10.job import ArmJob
+from tests.how_many import mostly_long
 from tests.wire.ur_process import EmulatorProcess, fresh_address, wait_until
 
 HELD = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31)
@@ -153,7 +154,7 @@ def test_unreachable_is_quick_and_clear() -> None:
     assert caught.value.where == f"{host}:30004"
 
 
-@pytest.mark.parametrize("version", [(3, 14, 3, 1), (5, 3, 0, 2)])
+@pytest.mark.parametrize("version", mostly_long(((3, 14, 3, 1), (5, 3, 0, 2)), (5, 3, 0, 2)))
 def test_wrong_version(version) -> None:
     with EmulatorProcess(version=version) as emulator, pytest.raises(DeviceProtocolError, match=r"3\.15"):
         Ur10(emulator.host).open()
@@ -180,7 +181,7 @@ def test_the_start_deadline_kills_a_child_that_hangs(robot, monkeypatch) -> None
     assert arm.health().state == LinkState.CLOSED
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
+@pytest.mark.parametrize("number", mostly_long((signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT), signal.SIGKILL))
 def test_a_dead_child_is_an_old_record(arm, number: signal.Signals) -> None:
     os.kill(child_pid(arm), number)
     wait_until(lambda: age_ms(arm) > 100, "the record grows old")

@@ -7,6 +7,7 @@ import pytest
 
 from robot_io.messages import ArmError, ArmState, LinkState
 from robot_io.ur10.driver import Ur10
+from tests.how_many import mostly_long
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
 
@@ -31,7 +32,9 @@ def record_age_ms(arm: Ur10) -> float:
     return (time.monotonic_ns() - arm.read().published_ns) / 1e6
 
 
-@pytest.mark.parametrize("fault", ["close_clients", "reset_clients", "close_rtde_clients"])
+@pytest.mark.parametrize(
+    "fault", mostly_long(("close_clients", "reset_clients", "close_rtde_clients"), "close_clients")
+)
 def test_a_closed_connection_is_lost_and_never_comes_back_by_itself(robot, arm, fault: str) -> None:
     robot.call(fault)
     wait_until(lambda: arm.read().link == LinkState.LOST, "the record says lost")
@@ -146,8 +149,14 @@ def test_text_messages_do_not_matter(robot, arm) -> None:
         # device_state: safety bits (2 bytes), then robot status, runtime, safety and robot mode
         (("protective_stop",), ArmState.PROTECTIVE_STOP, 0x0404_00_00_03_07, 0xFFFF_00_00_FF_FF),
         (("emergency_stop",), ArmState.EMERGENCY_STOP, 0x04C0_00_00_07_03, 0xFFFF_00_00_FF_FF),
-        (("safeguard_stop",), ArmState.PROTECTIVE_STOP, 0x0410_00_00_05_00, 0xFFFF_00_00_FF_00),
-        (("power_off",), ArmState.OFF, 0x0000_00_00_00_03, 0x0000_FF_00_00_FF),
+        pytest.param(
+            ("safeguard_stop",),
+            ArmState.PROTECTIVE_STOP,
+            0x0410_00_00_05_00,
+            0xFFFF_00_00_FF_00,
+            marks=pytest.mark.long,
+        ),
+        pytest.param(("power_off",), ArmState.OFF, 0x0000_00_00_00_03, 0x0000_FF_00_00_FF, marks=pytest.mark.long),
         (("teach_button", True), ArmState.MOVING, 0x0000_05_00_00_00, 0x0000_FF_00_00_00),
         (("play_other_program",), ArmState.FOREIGN_PROGRAM, 0x0000_03_02_00_00, 0x0000_FF_FF_00_00),
     ],

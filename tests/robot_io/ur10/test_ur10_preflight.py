@@ -9,6 +9,7 @@ import pytest
 
 from robot_io.errors import DeviceNotReady, DeviceProtocolError, DeviceUnreachable
 from robot_io.ur10.preflight import is_program_running, preflight
+from tests.how_many import mostly_long
 from tests.wire.ur_process import EmulatorProcess, fresh_address, wait_until
 
 BOUND_S = 3.5
@@ -65,7 +66,10 @@ def test_an_address_that_does_not_answer_at_all() -> None:
     assert "cable" in message
 
 
-@pytest.mark.parametrize("version", [(3, 14, 3, 1), (5, 3, 0, 0), (3, 2, 0, 0), (4, 15, 0, 0), (10, 7, 0, 0)])
+@pytest.mark.parametrize(
+    "version",
+    mostly_long(((3, 14, 3, 1), (5, 3, 0, 0), (3, 2, 0, 0), (4, 15, 0, 0), (10, 7, 0, 0)), (3, 14, 3, 1), (5, 3, 0, 0)),
+)
 def test_other_versions_are_refused_with_both_named(version) -> None:
     with EmulatorProcess(version=version) as emulator:
         message = refused(emulator.host, DeviceProtocolError)
@@ -117,7 +121,7 @@ def test_reduced_mode_is_fine(robot) -> None:
         robot.call("clear_stop")
 
 
-@pytest.mark.parametrize("fault", ["freeze", "mute_dashboard"])
+@pytest.mark.parametrize("fault", mostly_long(("freeze", "mute_dashboard"), "freeze"))
 def test_silence_is_bounded(robot, fault: str) -> None:
     robot.call(fault, True)
     try:

@@ -11,6 +11,7 @@ from robot_io.ipc.record import ARM_RECORD, TypedRecord
 from robot_io.messages import ArmError, LinkState
 from robot_io.ur10.driver import Ur10, spawn_arm
 from robot_io.ur10.job import ArmJob
+from tests.how_many import mostly_long
 from tests.wire.ur_process import EmulatorProcess, wait_until
 
 HELD = (1.5708, -0.1745, 1.5708, -1.3963, 1.5708, 1.31)
@@ -172,9 +173,9 @@ def test_a_script_that_does_not_start_is_said(robot) -> None:
     ("fault", "error"),
     [
         (("protective_stop",), ArmError.SERVO_STOPPED),
-        (("stop_program",), ArmError.SERVO_STOPPED),
-        (("pause_program",), ArmError.SERVO_STOPPED),
-        (("emergency_stop",), ArmError.SERVO_STOPPED),
+        pytest.param(("stop_program",), ArmError.SERVO_STOPPED, marks=pytest.mark.long),
+        pytest.param(("pause_program",), ArmError.SERVO_STOPPED, marks=pytest.mark.long),
+        pytest.param(("emergency_stop",), ArmError.SERVO_STOPPED, marks=pytest.mark.long),
         (("drift_step", [0, 0, 0, 0.2, 0, 0]), ArmError.SERVO_NOT_HOLDING),
         (("nan_joint", 2), ArmError.NOT_FINITE),
         (("mute",), ArmError.SERVO_STALE),
@@ -196,7 +197,9 @@ def test_the_first_fault_ends_it_for_good(robot, arm, fault, error: ArmError) ->
     assert robot.get("controller.runtime_state") == 1, "nothing has resumed"
 
 
-@pytest.mark.parametrize("fault", ["close_clients", "reset_clients", "close_rtde_clients"])
+@pytest.mark.parametrize(
+    "fault", mostly_long(("close_clients", "reset_clients", "close_rtde_clients"), "reset_clients")
+)
 def test_a_lost_connection_does_not_restart_the_script(robot, arm, fault: str) -> None:
     """The wheel's own thread, or its servoJ, would connect again and upload the script once more.
 

@@ -96,8 +96,8 @@ def test_a_circles_contact_lies_at_pi_minus_s_over_radius():
     ("changes", "square", "circle"),
     [
         ({"law": "open-loop"}, (27, 216, 0), (27, 0, 216)),
-        ({"k_y_rad_per_m": 0.3}, (87, 154, 2), (243, 0, 0)),
-        ({"k_f": 0.3, "k_y_rad_per_m": 0.5}, (87, 126, 30), (225, 0, 18)),
+        pytest.param({"k_y_rad_per_m": 0.3}, (87, 154, 2), (243, 0, 0), marks=pytest.mark.long),
+        pytest.param({"k_f": 0.3, "k_y_rad_per_m": 0.5}, (87, 126, 30), (225, 0, 18), marks=pytest.mark.long),
     ],
 )
 def test_how_many_lanes_other_controllers_lose(changes, square, circle):

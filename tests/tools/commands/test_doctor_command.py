@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.forked_push import forked
 from tests.push_runs import finished
 
 PROMISED = {
@@ -16,7 +17,7 @@ NAMED = [f"{of}.{name}" for of, names in PROMISED.items() for name in names.spli
 
 
 def test_level_sim_has_no_devices_to_look_at(state):
-    ended = finished(state, "doctor", "sim", "--json")
+    ended = forked(state, "doctor", "sim", "--json")
     told = ended.last_object
     assert ended.code == 0
     assert [check["check"] for check in told["checks"]] == NAMED
@@ -36,7 +37,7 @@ def test_an_emulated_robot_in_order_passes(state):
 
 @pytest.mark.parametrize("words", [("no-such-rig",), ("emulated", "--set", "control.k_f=many")])
 def test_a_rig_that_cannot_be_used(state, words):
-    ended = finished(state, "doctor", *words, "--json")
+    ended = forked(state, "doctor", *words, "--json")
     assert (ended.code, ended.last_object["error"]["code"]) == (2, 2)
 
 
@@ -51,7 +52,7 @@ def test_a_device_that_is_not_there_fails_with_exit_code_4(state):
 
 
 def test_the_proof_of_the_base_needs_the_word(state):
-    error = finished(state, "doctor", "emulated", "--prove-base-timeout", "--json").last_object["error"]
+    error = forked(state, "doctor", "emulated", "--prove-base-timeout", "--json").last_object["error"]
     assert error["code"] == 2
     assert "--move-robot" in error["do"]
 
@@ -83,12 +84,12 @@ def test_three_faults_at_once_are_all_named(state):
 
 @pytest.mark.parametrize("fault", ["ft.latency at 3 s", "ft.nonsense", "arm.version=many", "base.no-rosapi=1"])
 def test_a_fault_that_cannot_be(state, fault):
-    ended = finished(state, "doctor", "emulated", "--fault", fault, "--json")
+    ended = forked(state, "doctor", "emulated", "--fault", fault, "--json")
     assert (ended.code, ended.last_object["error"]["code"]) == (2, 2)
     assert fault in ended.last_object["error"]["what"]
 
 
 def test_no_fault_where_a_device_is_real(state):
     real = ("--set", "base.level=hardware", "--set", "base.url=ws://127.0.0.1:1")
-    ended = finished(state, "doctor", "emulated", *real, "--fault", "base.no-rosapi", "--json")
+    ended = forked(state, "doctor", "emulated", *real, "--fault", "base.no-rosapi", "--json")
     assert (ended.code, ended.last_object["error"]["code"]) == (2, 2)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.how_many import mostly_long
 from tests.robot_io.mcap import mcap_by_hand as by_hand
 from tools.cli import main
 
@@ -121,7 +122,7 @@ def push(*words: object, stdin: bytes) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(command, input=stdin, capture_output=True, timeout=60, check=False)
 
 
-@pytest.mark.parametrize("name", ["-", "/dev/stdin"])
+@pytest.mark.parametrize("name", mostly_long(("-", "/dev/stdin"), "-"))
 def test_a_pipe_is_read_like_a_file(tmp_path, name):
     raw = by_hand.file(OPENING, by_hand.message())
     done = push("cat", name, stdin=raw)

@@ -26,6 +26,7 @@ from robot_io.log.recovery import recover
 from robot_io.mcap.read import read_log, read_summary
 from robot_io.rig.config import RigConfig, load_rig, rig_from_toml, rig_to_toml
 from robot_io.tick import TICK_CDR, ControlTick, Phase
+from tests.push_runs import FAST_TARE
 from tools.cli import main
 from tools.commands import run_outputs
 from tools.laws import law_label
@@ -46,7 +47,7 @@ EVIL = "<script>alert(1)</script>\"'&$(x) \\frac{ \x1b[31m"
 def ran(tmp_path_factory) -> tuple[Path, str]:
     """A short run as a user makes it: its folder, and what it printed on stdout."""
     out = tmp_path_factory.mktemp("report") / "run"
-    command = ["run", "sim", "--fast", "--distance-m", "0.2", "--seed", "3", "--out", str(out), "--json"]
+    command = ["run", "sim", "--fast", "--distance-m", "0.2", "--seed", "3", *FAST_TARE, "--out", str(out), "--json"]
     code = "import sys; from tools.cli import main; sys.exit(main(sys.argv[1:]))"
     done = subprocess.run(
         [sys.executable, "-c", code, *command], cwd=ROOT, capture_output=True, text=True, check=True, timeout=80

@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from tests.forked_push import forked
 from tests.push_runs import QUICK, finished, one_error, started
 from tools.doctor.emulated import emulators
 from tools.places.device_locks import DeviceLocks
@@ -45,7 +46,7 @@ def terminal(typed):
 def test_a_failed_check_refuses(state, tmp_path):
     out = tmp_path / "out"
     with robot(tmp_path, "arm.protective-stop", devices=["arm"]) as rig:
-        ended = finished(state, "run", rig, "--move-robot", "--yes", "--out", str(out), "--json")
+        ended = forked(state, "run", rig, "--move-robot", "--yes", "--out", str(out), "--json")
     error = one_error(ended, 4)
     assert "stopped by safety" in error["what"]
     assert error["where"].startswith("ur10 127.")
@@ -67,7 +68,7 @@ def test_rows_of_a_device_that_a_run_holds_are_skipped_and_say_by_whom(state, tm
 
 @pytest.mark.parametrize("real", [True, False])
 def test_dry_run_connects_to_nothing_and_lists_the_checks(state, real):
-    ended = finished(state, "run", "thing" if real else "emulated", "--dry-run", "--json")
+    ended = forked(state, "run", "thing" if real else "emulated", "--dry-run", "--json")
     assert ended.code == 0
     told = ended.last_object
     assert ("ft.latency-timer" in told["checks"]) is real

@@ -10,6 +10,7 @@ import time
 import pytest
 import serial
 
+from tests.forked_push import forked
 from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished, one_error
 from tests.wire.bridge_process import running_bridge
@@ -32,12 +33,12 @@ url = "{url}"
 def push_fails(state, tmp_path, code, *argv, also_plain=True):
     """Run it with --json, and without; check everything that holds for every failure; return the error."""
     out = tmp_path / "out"
-    ended = finished(state, "run", *argv, "--out", str(out), "--json")
+    ended = forked(state, "run", *argv, "--out", str(out), "--json")
     error = one_error(ended, code)
     assert not out.exists(), "nothing was run, so nothing is kept"
     if not also_plain:
         return error
-    plain = finished(state, "run", *argv, "--out", str(out))
+    plain = forked(state, "run", *argv, "--out", str(out))
     assert (plain.code, plain.out) == (code, "")
     assert [line for line in plain.err.splitlines() if line.startswith("push: ")] == [
         line for line in ended.err.splitlines() if line.startswith("push: ")
@@ -68,8 +69,8 @@ def push_fails(state, tmp_path, code, *argv, also_plain=True):
 )
 def test_settings_that_cannot_be(state, tmp_path, setting, words):
     error = push_fails(state, tmp_path, 2, "emulated", "--set", setting)
-    told = f"{error['where']} {error['what']} {error['do']}"
-    assert [word for word in words if word not in told] == []
+    said = f"{error['where']} {error['what']} {error['do']}"
+    assert [word for word in words if word not in said] == []
 
 
 @pytest.mark.parametrize("controller", ["force", "open-loop"])
@@ -195,7 +196,7 @@ def test_a_real_rig_needs_the_word_before_any_packet(state, tmp_path):
             listener.setblocking(False)
             with pytest.raises(BlockingIOError):
                 listener.accept()
-    one_error(finished(state, "run", "thing", "--json"), 2)
+    one_error(forked(state, "run", "thing", "--json"), 2)
 
 
 def test_every_device_that_is_not_there_is_named(state, tmp_path):
@@ -203,7 +204,7 @@ def test_every_device_that_is_not_there_is_named(state, tmp_path):
     rig = tmp_path / "rig.toml"
     rig.write_text(THING.format(port=f"{tmp_path}/ttyFT", host=host, url=f"ws://{host}:{bridge_port}"))
     began_s = time.monotonic()
-    ended = finished(state, "run", str(rig), "--move-robot", "--out", str(tmp_path / "out"), "--json")
+    ended = forked(state, "run", str(rig), "--move-robot", "--out", str(tmp_path / "out"), "--json")
     assert time.monotonic() - began_s < 5.0
     error = one_error(ended, 4)
     for device, where in (

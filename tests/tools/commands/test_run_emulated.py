@@ -9,7 +9,6 @@ import json
 import os
 import pty
 import signal
-import subprocess
 import termios
 import time
 
@@ -19,8 +18,10 @@ from mcap_ros2.decoder import DecoderFactory
 
 from robot_io.mcap.read import read_summary
 from robot_io.tick import TICK_CDR
+from tests.forked_push import forked
 from tests.host_watch import repeated_when_the_host_stalls
-from tests.push_runs import PUSH, QUICK, ROOT, Run, finished, messages, one_error, stands, started, world_of
+from tests.how_many import mostly_long
+from tests.push_runs import QUICK, Run, finished, messages, one_error, stands, started, world_of
 from tests.wire.ur_process import wait_until
 
 DISTANCE_M = 0.2
@@ -60,10 +61,8 @@ def folder(shared_run):
 
 
 @pytest.fixture(scope="module")
-def replayed(done, folder):
-    return subprocess.run(
-        [*PUSH, "replay", str(folder), "--json"], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
-    )
+def replayed(done, state, folder):
+    return forked(state, "replay", str(folder), "--json")
 
 
 def furthest_m(log):
@@ -125,13 +124,14 @@ def test_people_read_it_on_stderr(done):
 
 
 def test_replay_is_identical_ticks_and_world(done, replayed):
-    assert replayed.returncode == 0, replayed.stderr
-    result = json.loads(replayed.stdout)
+    assert replayed.code == 0, replayed.err
+    result = replayed.last_object
     assert result["ticks"] == result["identical"] == done.last_object["loop"]["ticks"]
     assert (result["gaps"], result["first_difference"]) == (0, None)
     assert result["world"]["states"] == result["world"]["identical"] > 400
 
 
+@pytest.mark.long
 def test_the_log_in_the_eyes_of_others(done, folder):
     ours = {channel.topic: channel.messages for channel in read_summary(folder / "run.mcap").channels}
     assert ours["/control/tick"] == done.last_object["loop"]["ticks"]
@@ -154,7 +154,7 @@ def test_the_log_in_the_eyes_of_others(done, folder):
 
 def test_a_folder_with_a_run_is_refused(done, state, folder):
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    error = one_error(finished(state, "run", "emulated", "--out", str(folder), "--json"), 2)
+    error = one_error(forked(state, "run", "emulated", "--out", str(folder), "--json"), 2)
     assert str(folder) in error["where"]
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
@@ -178,9 +178,7 @@ def test_in_contact_with_the_tare_of_the_run_before(done, state, tmp_path, host)
 
 
 def test_in_contact_without_a_tare_is_refused(tmp_path):
-    ended = finished(
-        tmp_path / "state", "run", "emulated", "--start-in-contact", "--out", str(tmp_path / "x"), "--json"
-    )
+    ended = forked(tmp_path / "state", "run", "emulated", "--start-in-contact", "--out", str(tmp_path / "x"), "--json")
     error = one_error(ended, 2)
     assert "tare" in error["what"]
     assert not (tmp_path / "x").exists()
@@ -217,6 +215,7 @@ def assert_clean_stop(run: Run, folder, *signals: int) -> None:
     assert {path.name for path in folder.iterdir()} == FILES
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_sigterm_twice_at_once_is_one_clean_stop(state, tmp_path, host):
     """`timeout` signals the program and then its whole group."""
@@ -227,7 +226,9 @@ def test_sigterm_twice_at_once_is_one_clean_stop(state, tmp_path, host):
         assert_clean_stop(run, tmp_path / "run", signal.SIGTERM)
 
 
-@pytest.mark.parametrize("moment", ["announced", "emulators ready", "all started"])
+@pytest.mark.parametrize(
+    "moment", mostly_long(("announced", "emulators ready", "all started"), "announced", "all started")
+)
 def test_ctrl_c_while_starting_leaves_nothing(state, tmp_path, moment):
     out = tmp_path / "run"
     with started(state, "run", "emulated", *QUICK, "--out", str(out), "--json") as run:
@@ -338,9 +339,8 @@ def test_a_closed_terminal_is_a_clean_stop(state, tmp_path, host):
     assert (summary["verdict"], summary["faults"], summary["notes"]) == ("operator stop", ["F64"], [])
 
 
-@pytest.mark.parametrize(
-    "key", [pytest.param(b"\x1a", id="Ctrl-Z"), pytest.param(b"\x1c", id="Ctrl-backslash", marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("key", [b"\x1a", b"\x1c"], ids=["Ctrl-Z", "Ctrl-backslash"])
 @repeated_when_the_host_stalls
 def test_keys_that_a_terminal_makes_signals_of_stop_like_any_other(state, tmp_path, host, key):
     """A launcher put to sleep would hear no key, and the base would push on; the other processes hear none of it."""
@@ -390,7 +390,7 @@ def test_a_reader_that_stopped_reading_does_not_hold_up_the_stop(state, tmp_path
 
 def test_dry_run_opens_nothing(state, tmp_path):
     out = tmp_path / "dry"
-    ended = finished(state, "run", "thing", "--dry-run", "--out", str(out), "--json")
+    ended = forked(state, "run", "thing", "--dry-run", "--out", str(out), "--json")
     assert ended.code == 0, ended.err
     assert ended.last_object["dry_run"] is True
     assert ended.last_object["devices"]["ur10"]["level"] == "hardware"
@@ -398,7 +398,7 @@ def test_dry_run_opens_nothing(state, tmp_path):
 
 
 def test_fast_needs_level_sim(state):
-    error = one_error(finished(state, "run", "emulated", "--fast", "--json"), 2)
+    error = one_error(forked(state, "run", "emulated", "--fast", "--json"), 2)
     assert "--fast" in error["what"]
 
 
@@ -440,6 +440,7 @@ if "tools.run.control_process" in sys.orig_argv:
 """
 
 
+@pytest.mark.long
 def test_what_a_driver_warns_of_is_said(state, tmp_path):
     """An adapter that delivers late must be mended by the operator, and its driver knows how."""
     (tmp_path / "sitecustomize.py").write_text(LATE_ADAPTER)

@@ -50,7 +50,7 @@ def test_several_faults_and_those_of_the_rig_count_together(tmp_path):
 
 @pytest.mark.parametrize("words", ["ft.frozen at 300 s", "base.status.frozen at 1 s"])
 def test_a_fault_that_changed_nothing_is_an_error(tmp_path, words):
-    done = push(*SIM, "--out", tmp_path / "run", "--fault", words, state=tmp_path)
+    done = push(*SIM, "--distance-m", "0.1", "--out", tmp_path / "run", "--fault", words, state=tmp_path)
     assert done.returncode == 2
     [error] = [line for line in done.stderr.splitlines() if line.startswith("push: ")]
     assert f"`{words}` changed nothing" in error

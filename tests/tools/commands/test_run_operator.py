@@ -72,6 +72,14 @@ def ticks_of(out):
     return [TICK_CDR.decode(message.payload) for message in messages(out / "run.mcap", "/control/tick")]
 
 
+def operator_events(out, capsys):
+    """Return what the log says of the operator, as `push log cat` prints it."""
+    capsys.readouterr()
+    assert main(["log", "cat", str(out / "run.mcap"), "--topics", "/safety/event"]) == 0
+    events = [json.loads(line)["message"] for line in capsys.readouterr().out.splitlines()]
+    return [event["text"] for event in events if event["kind"] == "operator"]
+
+
 def check_pause(out, *, resting_after_s=0.5):
     """Check that the base stood while it was paused, that it went on afterwards, and that all of it replays."""
     ticks = ticks_of(out)
@@ -88,7 +96,7 @@ def check_pause(out, *, resting_after_s=0.5):
 
 
 @repeated_when_the_host_stalls
-def test_at_level_sim_space_pauses_and_goes_on_and_any_other_key_stops(tmp_path):
+def test_at_level_sim_space_pauses_and_goes_on_and_any_other_key_stops(tmp_path, capsys):
     terminal, out = Terminal(), tmp_path / "run"
     before = termios.tcgetattr(terminal.theirs)
     with started(tmp_path / "state", *SIM, "--out", str(out), **terminal.streams()) as run:
@@ -110,6 +118,7 @@ def test_at_level_sim_space_pauses_and_goes_on_and_any_other_key_stops(tmp_path)
     assert (summary["verdict"], summary["faults"], summary["pauses"]) == ("operator stop", ["F64"], 1)
     assert summary["paused_s"] > 0.5
     check_pause(out)
+    assert operator_events(out, capsys) == ["paused", "goes on after a pause"]
     assert termios.tcgetattr(terminal.theirs) == before
     assert push("replay", out, "--json", state=tmp_path).returncode == 0
     terminal.close()
@@ -126,6 +135,7 @@ def test_ctrl_z_at_level_sim_stops_and_freezes_nothing(tmp_path):
     terminal.close()
 
 
+@pytest.mark.long
 def test_a_pause_is_an_event_of_the_log(tmp_path, capsys):
     terminal, out = Terminal(), tmp_path / "run"
     with started(tmp_path / "state", *SIM, "--out", str(out), **terminal.streams()) as run:
@@ -137,10 +147,7 @@ def test_a_pause_is_an_event_of_the_log(tmp_path, capsys):
         terminal.type(b"x")
         run.wait(20.0)
     terminal.close()
-    capsys.readouterr()
-    assert main(["log", "cat", str(out / "run.mcap"), "--topics", "/safety/event"]) == 0
-    events = [json.loads(line)["message"] for line in capsys.readouterr().out.splitlines()]
-    assert [event["text"] for event in events if event["kind"] == "operator"] == ["paused", "goes on after a pause"]
+    assert operator_events(out, capsys) == ["paused", "goes on after a pause"]
 
 
 @pytest.mark.long

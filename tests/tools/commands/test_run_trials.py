@@ -11,6 +11,7 @@ import time
 import pytest
 
 from robot_io.mcap.read import read_summary
+from tests.forked_push import forked
 from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished, one_error, started
 from tests.tools.commands.test_run_asks_first import robot
@@ -37,20 +38,20 @@ def test_without_a_terminal_trials_follow_each_other_with_the_object_reset(state
         assert float(row["worst_force_N"]) == summary["worst_force_N"] > 5.0
     assert "3 of 3 trials done" in ended.err
     assert "worst force" in ended.err
-    assert finished(state, "report", str(out), "--out", str(tmp_path / "beside"), "--json").code == 0
+    assert forked(state, "report", str(out), "--out", str(tmp_path / "beside"), "--json").code == 0
     assert "box, 2 kg" in (tmp_path / "beside" / "compare.html").read_text()
 
 
 def test_a_trial_is_the_run_of_its_seed_from_the_same_start(state, tmp_path):
-    finished(state, *SIM, "--trials", "2", "--out", str(tmp_path / "both"))
-    finished(state, *SIM, "--seed", "1", "--out", str(tmp_path / "one"))
+    forked(state, *SIM, "--trials", "2", "--out", str(tmp_path / "both"))
+    forked(state, *SIM, "--seed", "1", "--out", str(tmp_path / "one"))
     second = (tmp_path / "both" / "trial-02" / "run.mcap").read_bytes()
     assert second == (tmp_path / "one" / "run.mcap").read_bytes()
 
 
 def test_a_folder_that_exists_is_refused(state, tmp_path):
     (tmp_path / "here").mkdir()
-    error = one_error(finished(state, *SIM, "--trials", "2", "--out", str(tmp_path / "here"), "--json"), 2)
+    error = one_error(forked(state, *SIM, "--trials", "2", "--out", str(tmp_path / "here"), "--json"), 2)
     assert "exists already" in error["what"]
     assert list((tmp_path / "here").iterdir()) == []
 
@@ -59,7 +60,7 @@ def test_a_real_robot_without_a_terminal_is_refused_in_words(state, tmp_path):
     rig = tmp_path / "real.toml"
     rig.write_text('extends = "emulated"\n[arm]\nlevel = "hardware"\nhost = "127.0.0.3"\n')
     out = tmp_path / "out"
-    error = one_error(finished(state, "run", str(rig), "--move-robot", "--trials", "5", "--out", str(out), "--json"), 2)
+    error = one_error(forked(state, "run", str(rig), "--move-robot", "--trials", "5", "--out", str(out), "--json"), 2)
     assert "asks on a terminal before each trial" in error["what"]
     assert "put the object back" in error["do"]
     assert not out.exists()
@@ -67,7 +68,7 @@ def test_a_real_robot_without_a_terminal_is_refused_in_words(state, tmp_path):
 
 @pytest.mark.parametrize("words", [("--trials", "0"), ("--trials", "1001"), ("--note", "a\nb"), ("--note", "x" * 501)])
 def test_what_cannot_be_meant_is_a_usage_error(state, tmp_path, words):
-    one_error(finished(state, *SIM, *words, "--out", str(tmp_path / "x"), "--json"), 2)
+    one_error(forked(state, *SIM, *words, "--out", str(tmp_path / "x"), "--json"), 2)
     assert not (tmp_path / "x").exists()
 
 
@@ -91,19 +92,20 @@ def test_on_a_terminal_enter_goes_on_and_q_ends(state, tmp_path):
 
 def test_a_fault_that_stops_every_trial_leaves_a_table_and_its_code(state, tmp_path):
     out = tmp_path / "out"
-    ended = finished(state, *SIM, "--trials", "2", "--set", "limits.max_force_N=8", "--set", "limits.slow_force_N=7",
+    ended = forked(state, *SIM, "--trials", "2", "--set", "limits.max_force_N=8", "--set", "limits.slow_force_N=7",
                      "--out", str(out), "--json")  # fmt: skip
     assert ended.code == 5, ended.err
     assert [trial["first_fault"] for trial in ended.last_object["trials"]] == ["F50-stop"] * 2
     assert "limit 8 N" in ended.last_object["trials"][0]["why"]
 
 
-def test_the_verdict_comes_first_and_the_report_is_announced(state, tmp_path):
+def test_the_verdict_comes_first_and_the_report_is_announced_with_its_note_on_the_page(state, tmp_path):
     """The two streams of a terminal are one: what is told first is read first."""
     read_fd, write_fd = os.pipe()
     out = tmp_path / "out"
     words = [word for word in SIM if word != "--no-report"]
-    with started(state, *words, "--out", str(out), stdout=write_fd, stderr=write_fd) as run:
+    note = ("--note", "barrel <half> full")
+    with started(state, *words, *note, "--out", str(out), stdout=write_fd, stderr=write_fd) as run:
         os.close(write_fd)
         told, moments = "", {}
         while text := os.read(read_fd, 4096).decode():
@@ -118,11 +120,13 @@ def test_the_verdict_comes_first_and_the_report_is_announced(state, tmp_path):
     assert order == sorted(order)
     assert list(moments) == ["pushed ", "writing the report ...", "report: "]
     assert [there for _, there in moments.values()] == [False, False, True]
+    assert "barrel &lt;half&gt; full" in (out / "report.html").read_text()
 
 
+@pytest.mark.long
 def test_a_note_is_on_the_page_of_its_run(state, tmp_path):
     words = [word for word in SIM if word != "--no-report"]
-    finished(state, *words, "--note", "barrel <half> full", "--out", str(tmp_path / "run"))
+    forked(state, *words, "--note", "barrel <half> full", "--out", str(tmp_path / "run"))
     assert "barrel &lt;half&gt; full" in (tmp_path / "run" / "report.html").read_text()
 
 

@@ -15,7 +15,7 @@ from robot_io.log.world_messages import STATE_CDR
 from robot_io.rig.config import load_rig
 from sim_backend.sim.ft300 import SimFt300
 from tests.host_watch import repeated_when_the_host_stalls
-from tests.push_runs import QUICK, messages, started
+from tests.push_runs import FAST_TARE, QUICK, messages, started
 from tests.replay.runs import push
 from tools.run import lockstep
 from tools.run.lockstep import Lockstep, simulated_sensor
@@ -23,7 +23,7 @@ from tools.verdict.evidence import gather
 from tools.verdict.judgement import judge
 from tools.verdict.witness import Witness
 
-SIM = ("run", "sim", "--fast", "--json")
+SIM = ("run", "sim", "--fast", "--json", *FAST_TARE)
 MOCAP_M, MOCAP_RAD = 0.0005, math.radians(0.2)
 """Noise of the simulated motion capture, 1 sigma; an angle turned is the difference of two."""
 TURNED = (
@@ -48,7 +48,7 @@ def says(summary):
 
 
 def test_a_good_push_is_done_and_nothing_speaks_against_it(tmp_path):
-    code, summary, said = ran(tmp_path, "--distance-m", "0.3")
+    code, summary, said = ran(tmp_path, "--distance-m", "0.3", "--no-report")
     assert (code, summary["verdict"], summary["first_fault"]) == (0, "done", None)
     assert set(says(summary).values()) == {"for"}
     assert {"corridor", "end", "residual", "contact_lost_m", "contact_lost_times", "log", "log_dropped"} <= set(
@@ -60,7 +60,7 @@ def test_a_good_push_is_done_and_nothing_speaks_against_it(tmp_path):
 
 
 def test_a_push_that_ends_off_its_line_is_not_done(tmp_path):
-    code, summary, said = ran(tmp_path, *TURNED, "--distance-m", "4")
+    code, summary, said = ran(tmp_path, *TURNED, "--distance-m", "1")
     assert (code, summary["verdict"], summary["first_fault"]) == (9, "off the line", None)
     end = next(item for item in summary["trust"] if item["id"] == "end")
     assert end["says"] == "against"
@@ -68,7 +68,7 @@ def test_a_push_that_ends_off_its_line_is_not_done(tmp_path):
     assert ", but off the line: " in said
     assert end["text"] in said
     page = (tmp_path / "run" / "report.html").read_text()
-    assert '<h1 class="bad">Pushed 4.00 m, off the line</h1>' in page
+    assert '<h1 class="bad">Pushed 1.00 m, off the line</h1>' in page
     assert end["text"] in page
 
 

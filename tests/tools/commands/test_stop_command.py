@@ -13,6 +13,7 @@ import msgspec
 import pytest
 
 from robot_io.messages import BodyTwist
+from tests.forked_push import forked
 from tests.host_watch import repeated_when_the_host_stalls
 from tests.push_runs import QUICK, finished, one_error, stands, started, world_of
 from tests.wire.bridge_process import running_bridge, until
@@ -91,7 +92,7 @@ def of_base(url):
 
 def test_a_base_without_a_run_is_sent_zeros_and_its_address_is_said(state):
     with running_bridge() as bridge:
-        stop = finished(state, *of_base(bridge.url), "--json")
+        stop = forked(state, *of_base(bridge.url), "--json")
         heard = bridge.heard()
     assert stop.code == 0, stop.err
     assert f"connecting to {bridge.url} and sending zeros" in stop.err
@@ -110,13 +111,13 @@ def test_a_base_that_moves_on_is_not_called_at_rest(state):
 
 
 def test_a_base_that_nobody_answers_for(state):
-    error = one_error(finished(state, *of_base("ws://127.0.0.1:1"), "--json"), 4)
+    error = one_error(forked(state, *of_base("ws://127.0.0.1:1"), "--json"), 4)
     assert error["where"] == "ws://127.0.0.1:1"
 
 
 @pytest.mark.parametrize("asked", [(), ("emulated",), ("sim",)])
 def test_nothing_to_stop(state, asked):
-    stop = finished(state, "stop", *asked, "--json")
+    stop = forked(state, "stop", *asked, "--json")
     assert stop.code == 0, stop.err
     assert stop.last_object["stopped"] == []
     assert "no run is under way" in stop.err

@@ -14,6 +14,7 @@ import time
 import pytest
 
 from robot_io.rig.topics import TopicsConfig
+from tests.forked_push import forked
 from tests.push_runs import PUSH, QUICK, ROOT, finished, one_error, started
 from tests.wire.bridge_process import running_bridge
 from tests.wire.ft300_process import ft300_process
@@ -130,12 +131,12 @@ def test_devices_that_are_all_in_use_are_not_opened(state, monkeypatch):
     keys = [f"{key}={value}" for key, value in where.items()] + [f"{d}.level=hardware" for d in ("ft", "arm", "base")]
     with DeviceLocks(resolve_rig("emulated", keys)):
         settings = [word for key in keys for word in ("--set", key)]
-        error = one_error(finished(state, "watch", "emulated", "--json", *settings), 3)
+        error = one_error(forked(state, "watch", "emulated", "--json", *settings), 3)
     assert f"process {os.getpid()}" in error["what"]
 
 
 def test_at_level_sim_there_is_nothing_to_watch(state):
-    error = one_error(finished(state, "watch", "sim", "--json"), 2)
+    error = one_error(forked(state, "watch", "sim", "--json"), 2)
     assert "nothing to watch" in error["what"]
 
 

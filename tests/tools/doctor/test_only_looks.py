@@ -5,6 +5,7 @@ import threading
 import pytest
 
 from robot_io.rig.topics import TopicsConfig
+from tests.how_many import mostly_long
 from tests.wire.bridge_process import running_bridge
 from tests.wire.ft300_process import ft300_process
 from tests.wire.ur_process import EmulatorProcess as UrProcess
@@ -20,7 +21,7 @@ def real(device, key, address, *more):
     return resolve_rig("emulated", [f"{device}.level=hardware", f"{device}.{key}={address}", *more])
 
 
-@pytest.mark.parametrize("streaming", [False, True])
+@pytest.mark.parametrize("streaming", mostly_long((False, True), False))
 def test_the_sensor_is_never_told_to_stream(streaming):
     with ft300_process(streaming=streaming) as sensor:
         rows = {row.check: row.result for row in ft_checks(real("ft", "port", sensor.port))}

@@ -70,7 +70,7 @@ def proved(monkeypatch, rig, base):
     ("after_s", "follows", "result", "word"),
     [
         (0.25, True, "ok", "stood"),
-        (0.6, True, "failed", "stood"),
+        pytest.param(0.6, True, "failed", "stood", marks=pytest.mark.long),
         (9.0, True, "failed", "still moving"),
         (0.25, False, "failed", "does not move"),
     ],

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.push_runs import finished
+from tests.forked_push import forked
 from tests.tools.report.conftest import SHORT
 from tools.report.run_data import read_run
 from tools.report.run_verdict import verdict
@@ -14,7 +14,7 @@ from tools.report.run_verdict import verdict
 def stopped(tmp_path_factory):
     """The log of a run whose sensor fell silent after 4 s, the world going on."""
     folder = tmp_path_factory.mktemp("stopped")
-    ended = finished(folder / "state", *SHORT, "--fault", "ft.off at 4 s", "--out", str(folder / "run"))
+    ended = forked(folder / "state", *SHORT, "--fault", "ft.off at 4 s", "--out", str(folder / "run"))
     assert ended.code == 5, ended.err
     return read_run(folder / "run" / "run.mcap")
 

@@ -10,6 +10,7 @@ from robot_io.errors import UsageError
 from robot_io.mcap.read import read_summary
 from robot_io.tick import Phase
 from safety.motion_bounds import total_bounds
+from tests.how_many import mostly_long
 from tests.replay.runs import push
 from tools.commands.run import blind_words
 from tools.rig import resolve_rig
@@ -144,7 +145,7 @@ def test_an_object_that_is_met_late_does_not_lead_out_of_the_workspace():
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))])
-@pytest.mark.parametrize("more", [("path.direction_deg=137",), ("base.pose_source=odometry",), ROOM])
+@pytest.mark.parametrize("more", mostly_long((("path.direction_deg=137",), ("base.pose_source=odometry",), ROOM), ROOM))
 def test_a_normal_push_does_not_notice_it(seed, more):
     figures, ticks = run("control.distance_m=1.5", *more, seed=seed)
     assert figures["exit_code"] == 0

@@ -25,14 +25,14 @@ from robot_io.messages import BaseOdometry, BodyTwist
 from robot_io.rig.config import rig_to_toml
 from robot_io.tick import TICK_CDR, Phase
 from sim_backend.sim.ridgeback import SimRidgeback
-from tests.push_runs import QUICK
+from tests.push_runs import FAST_TARE, QUICK
 from tests.replay.runs import PUSH, ROOT, push
 from tools.rig import resolve_rig
 from tools.run import paced
 from tools.run.lockstep import Lockstep, open_log
 from tools.run.tick_core import TickCore
 
-SHORT = ("run", "sim", "--fast", "--distance-m", "0.1", "--no-report")
+SHORT = ("run", "sim", "--fast", "--distance-m", "0.1", "--no-report", *FAST_TARE)
 
 
 def log_of(out: Path, *words: str, state: Path, cwd: Path = ROOT, **env: str) -> bytes:
@@ -90,6 +90,7 @@ def test_level_sim_imports_no_figures_solvers_or_wires(tmp_path):
     assert done.stderr.splitlines()[-1] == "[]"
 
 
+@pytest.mark.long
 def test_the_operators_stop_ends_a_paced_run_with_130_and_a_whole_log(tmp_path):
     out = tmp_path / "run"
     words = [

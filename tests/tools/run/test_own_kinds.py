@@ -11,6 +11,8 @@ import pytest
 
 from robot_io.mcap.read import read_log
 from robot_io.tick import TICK_CDR
+from tests.forked_push import forked
+from tests.how_many import mostly_long
 from tests.push_runs import QUICK, pushed
 
 OWN = Path(__file__).with_name("own_devices.py")
@@ -27,6 +29,12 @@ def folder(tmp_path):
 @pytest.fixture
 def push(host):
     return partial(pushed, host=host)
+
+
+@pytest.fixture
+def refused(state):
+    """Run what ends before a base moves."""
+    return lambda folder, *argv: forked(state, *argv, cwd=folder)
 
 
 @pytest.mark.long
@@ -61,14 +69,14 @@ def test_an_arm_that_says_it_may_be_moved_stops_the_push(push, folder):
     assert done.last_object["faults"] == ["F27"]
 
 
-def test_beside_the_rig_file_it_is_found_from_anywhere(push, folder, tmp_path):
+def test_beside_the_rig_file_it_is_found_from_anywhere(refused, folder, tmp_path):
     (folder / "mine.toml").write_text(
         'extends = "emulated"\nname = "mine"\n[arm]\nkind = "own_devices:Arm"\n', encoding="utf-8"
     )
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    assert push(elsewhere, "config", "check", str(folder / "mine.toml")).code == 0
-    assert push(elsewhere, "config", "check", "emulated", "--set", "arm.kind=own_devices:Arm").code == 2
+    assert refused(elsewhere, "config", "check", str(folder / "mine.toml")).code == 0
+    assert refused(elsewhere, "config", "check", "emulated", "--set", "arm.kind=own_devices:Arm").code == 2
 
 
 MODULE = """
@@ -116,12 +124,12 @@ class Weak(Whole):
         ("os:path", "is not a class"),
     ],
 )
-def test_a_kind_that_cannot_be_used_is_one_sentence_and_opens_nothing(push, folder, kind, says):
+def test_a_kind_that_cannot_be_used_is_one_sentence_and_opens_nothing(refused, folder, kind, says):
     (folder / "kinds.py").write_text(MODULE, encoding="utf-8")
     (folder / "broken.py").write_text("class Sensor(:\n", encoding="utf-8")
     (folder / "raising.py").write_text("1 / 0\n", encoding="utf-8")
     (folder / "leaving.py").write_text("import os\nos._exit(7)\n", encoding="utf-8")
-    done = push(folder, "run", "emulated", "--set", f"ft.kind={kind}", "--out", "out", "--json")
+    done = refused(folder, "run", "emulated", "--set", f"ft.kind={kind}", "--out", "out", "--json")
     assert done.code == 2, done.err
     assert says in done.err
     assert "Traceback" not in done.err
@@ -173,12 +181,12 @@ def sensors(folder):
 @pytest.mark.parametrize(
     ("kind", "code", "says"),
     [
-        ("Constructor", 2, "its driver failed: TypeError: planted"),
+        pytest.param("Constructor", 2, "its driver failed: TypeError: planted", marks=pytest.mark.long),
         ("Opening", 4, "its driver failed: OSError: planted"),
     ],
 )
-def test_what_a_driver_should_not_raise_names_the_driver(push, sensors, kind, code, says):
-    done = push(sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--out", "out", "--json")
+def test_what_a_driver_should_not_raise_names_the_driver(refused, sensors, kind, code, says):
+    done = refused(sensors, "run", "emulated", "--set", f"ft.kind=sensors:{kind}", "--out", "out", "--json")
     assert done.code == code, done.err
     assert says in done.last_object["error"]["what"]
     assert f"sensors:{kind}" in done.err
@@ -224,21 +232,23 @@ def test_stamps_from_the_future_do_not_hide_a_silent_sensor(push, sensors):
     assert 0 < stopped_ns - newest_ns < 200_000_000
 
 
-def test_a_base_without_its_attributes_is_refused(push, folder):
+def test_a_base_without_its_attributes_is_refused(refused, folder):
     (folder / "bare.py").write_text(
         "from own_devices import Base\nclass Bare(Base):\n    def __init__(self, address):\n"
         "        super().__init__(address)\n        del self.sent_ns\n",
         encoding="utf-8",
     )
-    done = push(folder, "run", "emulated", "--set", "base.kind=bare:Bare", "--out", "out", "--json")
+    done = refused(folder, "run", "emulated", "--set", "base.kind=bare:Bare", "--out", "out", "--json")
     assert done.code == 2, done.err
     assert "lacks `sent_ns`" in done.err
 
 
-@pytest.mark.parametrize("device", ["arm=own_devices:Arm", "base=own_devices:Base"])
-def test_level_sim_has_no_arm_or_base_of_ones_own(push, folder, device):
+@pytest.mark.parametrize(
+    "device", mostly_long(("arm=own_devices:Arm", "base=own_devices:Base"), "base=own_devices:Base")
+)
+def test_level_sim_has_no_arm_or_base_of_ones_own(refused, folder, device):
     name, _, kind = device.partition("=")
-    done = push(folder, "run", "sim", "--set", f"{name}.kind={kind}", "--fast")
+    done = refused(folder, "run", "sim", "--set", f"{name}.kind={kind}", "--fast")
     assert done.code == 2
     assert "cannot be simulated at level sim" in done.err
 

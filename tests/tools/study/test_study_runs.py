@@ -5,6 +5,7 @@ import json
 
 import pytest
 
+from tests.how_many import mostly_long
 from tools import cli
 from tools.study import plan as study_plan
 from tools.study.one_push import FIXED_AFTER, Job, run_push
@@ -145,7 +146,7 @@ def test_after_an_interruption_only_the_rest_is_run_and_the_bytes_are_the_same(
     assert (out / "runs.csv").read_bytes() == (done / "runs.csv").read_bytes()
 
 
-@pytest.mark.parametrize("kept", ["full", "ticks"])
+@pytest.mark.parametrize("kept", mostly_long(("full", "ticks"), "ticks"))
 def test_a_log_of_a_study_replays_and_changes_nothing(done, file, tmp_path, capsys, kept):
     file.write_text(STUDY.replace("seeds = 2", "seeds = 1").replace(', "open-loop"', ""))
     out = tmp_path / "out"
