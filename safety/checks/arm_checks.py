@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from operator import sub
 
 from msgspec.structs import replace
 
@@ -40,12 +39,12 @@ def check(
             faults.append(Finding("F25-hold", still_ns / NS_PER_MS))
     if not all(map(math.isfinite, (*joints.position, *joints.velocity))):
         return state, [*faults, "F29"]
-    drift = max(map(abs, map(sub, joints.position, control.held_joints)))
+    drift = max([abs(q - held) for q, held in zip(joints.position, control.held_joints, strict=True)])
     if drift > settings.drift_stop:
         faults.append(Finding("F20-stop", drift))
     elif drift > settings.drift_hold:
         faults.append(Finding("F20-hold", drift))
-    off = max(map(abs, map(sub, joints.position, settings.held_pose)))
+    off = max([abs(q - p) for q, p in zip(joints.position, settings.held_pose, strict=True)])
     if off > settings.held_pose_tolerance:
         faults.append(Finding("R04", off))
     run = state.arm_velocity_run
