@@ -210,6 +210,7 @@ def check_table_snippet(block: str, cwd: Path) -> None:
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_the_snippet_of_a_wire_fault_works():
     [block] = python_blocks("docs/working-on-it.md")
     done = subprocess.run(

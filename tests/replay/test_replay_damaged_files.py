@@ -91,6 +91,7 @@ def test_any_flipped_byte_of_the_file_is_damage(sim_log, tmp_path, capsys):
         assert sentence(capsys, path)[0] == DAMAGED, index
 
 
+@pytest.mark.long
 def test_a_huge_length_anywhere_needs_no_memory(sim_log, tmp_path):
     """Lengths beyond the file and beyond the limit, and a chunk that unpacks to 300 MB, in 600 MB of address space."""
     data = sim_log.read_bytes()

@@ -30,6 +30,7 @@ def answers(capsys, log: Path) -> list[tuple[int, dict]]:
     return [replayed(capsys, log, "--ticks", "--jobs", jobs) for jobs in JOBS]
 
 
+@pytest.mark.long
 def test_any_number_of_processes_finds_the_same(long_run, capsys):
     one, *others = answers(capsys, long_run)
     assert one[0] == 0

@@ -186,6 +186,7 @@ def test_the_gate_puts_it_into_its_record():
     assert shell.record.lag_ns == pytest.approx(80 * MS, abs=MS)
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_on_the_wire(tmp_path):
     """An emulated bridge that holds everything back by 90 ms, after a second without."""

@@ -25,6 +25,7 @@ NO_VENV_PACKAGE = "-m venv [!-]*"  # Debian without python3-venv: only --without
 NO_PIP_PACKAGE = "-m pip*"
 
 
+@pytest.mark.long
 def test_only_pip_present_installs_from_outside(tmp_path):
     python = python_that_refuses(tmp_path, NO_VENV_PACKAGE)
     venv = tmp_path / "env"

@@ -38,6 +38,7 @@ def test_answers_that_take_longer_than_a_second_count():
         assert base.health().counters["unanswered_checks"] == 0
 
 
+@pytest.mark.long
 def test_a_rosapi_that_never_comes_is_given_up_and_said():
     with running_bridge(bridge={"cold_s": 60.0}) as bridge:
         base = Ridgeback(bridge.url, topics=QUICK)

@@ -95,6 +95,7 @@ def check_pause(out, *, resting_after_s=0.5):
     assert {tick.after.control.resumes for tick in ticks} == {0}
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_at_level_sim_space_pauses_and_goes_on_and_any_other_key_stops(tmp_path, capsys):
     terminal, out = Terminal(), tmp_path / "run"

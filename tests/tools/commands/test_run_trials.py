@@ -19,6 +19,7 @@ from tests.tools.commands.test_run_asks_first import robot
 SIM = ("run", "sim", "--fast", *QUICK, "--distance-m", "0.1")
 
 
+@pytest.mark.long
 def test_without_a_terminal_trials_follow_each_other_with_the_object_reset(state, tmp_path):
     out = tmp_path / "box"
     ended = finished(state, *SIM, "--trials", "3", "--seed", "5", "--note", "box, 2 kg", "--out", str(out), "--json")

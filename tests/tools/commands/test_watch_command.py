@@ -197,6 +197,7 @@ def strip(line):
     return line
 
 
+@pytest.mark.long
 def test_it_survives_a_resize_and_gives_the_terminal_back(state):
     screen = Screen(state, 100, LANG="C.UTF-8", PYTHONUTF8="1", COLUMNS="80")  # some shells export it
     wait_until(lambda: any(line.startswith("BODY ") for line in screen.frame()), "the force is shown", 30.0)

@@ -30,6 +30,7 @@ def until(device, wanted, within_s=20.0):
     raise AssertionError(f"it says {newest}, not {wanted}")
 
 
+@pytest.mark.long
 def test_the_drivers_see_the_moved_arm_and_what_hangs_on_it():
     """0.6 kg weigh 5.886 N; with the last joint at pi/2 the sensor's x points up (docs/frames-and-signs.md)."""
     read_end, write_end = os.pipe()

@@ -4,6 +4,7 @@ import select
 import socket
 import threading
 
+import pytest
 import serial
 
 from tests.wire.ft300_process import ft300_process
@@ -30,6 +31,7 @@ def rows_of(port):
     return {row.check: row for row in ft_checks(rig)}
 
 
+@pytest.mark.long
 def test_what_can_be_seen_over_tcp_is():
     done = threading.Event()
     with ft300_process(ramp=True) as emulator, socket.create_server(("127.0.0.1", 0)) as listener:

@@ -11,6 +11,7 @@ from tools.cli import main
 from tools.report.film import gif
 
 
+@pytest.mark.long
 def test_a_gif_shows_the_push_four_times_as_fast(runs, tmp_path):
     assert main(["report", str(runs / "one"), str(runs / "open"), "--gif", "--out", str(tmp_path)]) == 0
     film = tmp_path / "film.gif"
