@@ -301,6 +301,21 @@ def test_a_tick_that_does_not_come_leaves_no_gap_in_the_commands():
     assert due(LIMITS, state, T0 + 22 * MS) == BodyTwist(0.1)
 
 
+@pytest.mark.parametrize(("next_ms", "waits"), [(30.0, True), (30.001, False), (40.0, False)])
+def test_a_frame_that_is_to_come_later_than_30_ms_after_a_command_is_not_awaited(next_ms, waits):
+    limits = replace(LIMITS, period_ns=20 * MS)
+    frame_ns = T0 + round((next_ms - 20.0) * MS)
+    state = replace(ROLLING, twist=BodyTwist(0.1), sent=BodyTwist(0.1), sent_ns=T0, frame_ns=frame_ns)
+    now = max(T0 + 18 * MS, frame_ns + 3 * MS)
+    assert due(limits, state, now) == (None if waits else BodyTwist(0.1))
+
+
+def test_a_latched_gate_awaits_nothing():
+    """Control may still be sending; zeros are repeated every 18 ms all the same."""
+    state = latched(replace(ROLLING, sent=ZERO, sent_ns=T0, frame_ns=T0 + 10 * MS), Latch.STEP)
+    assert due(LIMITS, state, T0 + 18 * MS) == ZERO
+
+
 @pytest.mark.parametrize(
     ("rate_hz", "leaves_ms"), [(50, 20), (60, 18), (80, 25), (100, 20), (125, 24), (200, 20), (500, 18)]
 )
