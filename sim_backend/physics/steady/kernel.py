@@ -16,6 +16,7 @@ from functools import cache
 from math import cos, sin, sqrt
 from typing import Any, cast
 
+from sim_backend.physics.contact import LATER_TURNS
 from sim_backend.physics.floor import LIFTED
 from sim_backend.physics.slider_exact import TINY
 
@@ -67,7 +68,7 @@ def plain(given: Floats, state: Floats, steps: int) -> int:
             break
         # what the slider answers: the floor's grip depends on the push, and the push on the grip
         to_push_x, to_push_y, size, f_x, f_y, vx, vy, turn = push_x, push_y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for _ in range(2):
+        for _ in range(LATER_TURNS):
             size = sqrt(to_push_x * to_push_x + to_push_y * to_push_y)
             px, py = to_push_x / size, to_push_y / size
             square, lean = xx * px * px + 2.0 * xy * px * py + yy * py * py, shift + off_x * px + off_y * py

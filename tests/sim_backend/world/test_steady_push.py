@@ -8,6 +8,7 @@ import pytest
 
 from robot_io.log.world_messages import WorldState
 from robot_io.messages import BodyTwist
+from robot_io.named_values import ContactMode
 from sim_backend.physics.steady import kernel
 from sim_backend.world.world import World
 from tools.rig import resolve_rig
@@ -19,7 +20,6 @@ SLIDERS = {
     "box with its weight aside": ("world.slider.cof_m=[0.03, -0.05]",),
     "box pushed at its edge": ("world.start.edge_offset_m=0.19",),
 }
-"""Of the last one the ball soon goes round the corner."""
 
 
 def commands(seed: int, seconds: float) -> list[tuple[int, BodyTwist]]:
@@ -78,6 +78,48 @@ def test_it_is_what_single_steps_are(slider, seed):
         assert one[1].force_x == pytest.approx(other[1].force_x, abs=1e-5)
         assert one[1].force_y == pytest.approx(other[1].force_y, abs=1e-5)
         assert one[1].mode == other[1].mode
+
+
+def along(edge_m: float, twist: BodyTwist, *, steady: bool) -> tuple[list[int], list[tuple]]:
+    """Push for 1.5 s, go on with another command for 4.5 s; return the faces then touched, and slider and contact."""
+    start = (f"world.start.edge_offset_m={edge_m}", "world.start.spread=0")
+    world, faces, seen = World(resolve_rig("sim", start), 3, 0), [], []
+    if not steady:
+        world._steady = None
+    for at in range(0, 6_000, 40):
+        world.command_base(BodyTwist(0.1, 0.0, 0.0) if at < 1_500 else twist, at * MS)
+        world.advance_to((at + 40) * MS)
+        if at >= 1_500:
+            faces.append(world._slider.face)
+            seen.append((world.read_slider((at + 40) * MS), world._contact))
+    return faces, seen
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_ball_that_leaves_its_face_goes_round_the_corner_as_in_single_steps(side):
+    turned = BodyTwist(0.05, side * 0.1, 0.0)
+    faces, seen = along(side * 0.15, turned, steady=True)
+    single_faces, single = along(side * 0.15, turned, steady=False)
+    assert faces == single_faces
+    assert -1 in faces, "it never came to the corner"
+    for (pose, contact), (other_pose, other) in zip(seen, single, strict=True):
+        assert (pose.x, pose.y, pose.yaw) == pytest.approx((other_pose.x, other_pose.y, other_pose.yaw), abs=1e-7)
+        assert contact.mode == other.mode
+
+
+def test_a_ball_that_moves_more_than_a_millimetre_in_a_step_is_cut_into_pieces_as_in_single_steps():
+    """1.1 m/s, the fastest that the base goes."""
+    _, seen = along(0.03, BodyTwist(1.1, 0.0, 0.0), steady=True)
+    _, single = along(0.03, BodyTwist(1.1, 0.0, 0.0), steady=False)
+    for (pose, _), (other, _) in zip(seen, single, strict=True):
+        assert (pose.x, pose.y, pose.yaw) == pytest.approx((other.x, other.y, other.yaw), abs=1e-8)
+
+
+def test_a_ball_that_creeps_by_less_than_a_nanometre_a_second_rests_and_keeps_its_force():
+    _, seen = along(0.03, BodyTwist(5e-10, 0.0, 0.0), steady=True)
+    _, single = along(0.03, BodyTwist(5e-10, 0.0, 0.0), steady=False)
+    assert [contact.mode for _, contact in seen] == [contact.mode for _, contact in single]
+    assert seen[-1][1].mode == ContactMode.HOLDING
 
 
 def test_nearly_every_step_of_a_push_is_one(monkeypatch):

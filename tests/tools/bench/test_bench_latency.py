@@ -23,10 +23,11 @@ def twist(at: int) -> BodyTwist:
     return BodyTwist(0.1, 0.001 * at, 0.0)
 
 
-def ticks(late_us: int = 100, sent_us: int = 400, of_two: int = 0) -> list[ControlTick]:
-    """Return ticks of 10 ms around the press, 3 ms beside it, that read in 20 us; the gate sends every other command.
+def ticks(of_two: int = 0) -> list[ControlTick]:
+    """Return ticks of 10 ms around the press, 3 ms beside it, that wake up 100 us late and read in 20.
 
-    A packet comes 6 ms after each tick's deadline, and from the press on its force is 8 N.
+    The gate sends every other command. A packet comes 6 ms after each tick's deadline; from the press on its force is
+    8 N.
     """
     good, made = FoldBench().good_input(), []
     sent = BaseRecord()
@@ -37,14 +38,14 @@ def ticks(late_us: int = 100, sent_us: int = 400, of_two: int = 0) -> list[Contr
         reading = FtReading(received_ns, at + 8, force, (0.0, 0.0, 0.0))
         inp = replace(
             good,
-            now_ns=deadline_ns + (late_us + 20) * US,
-            host=HostInput(late_us * US, 0, True, True, True, False, 0),
+            now_ns=deadline_ns + 120 * US,
+            host=HostInput(100 * US, 0, True, True, True, False, 0),
             ft=FtInput((reading,), LinkState.UP, at + 8, 0, 0),
             base=sent,
         )
         made.append(tick(inp, twist(at)))
         if at % 2 == of_two:
-            sent = BaseRecord(sent=twist(at), sent_ns=deadline_ns + sent_us * US)
+            sent = BaseRecord(sent=twist(at), sent_ns=deadline_ns + 400 * US)
     return made
 
 
