@@ -2,7 +2,8 @@
 
 Neighbouring numbers, also across nested Structs, form a run that is unpacked by one `struct.Struct` call, with one
 format for each of the eight offsets at which the run may start. Fields of variable length are parts of their own. All
-that is nothing but numbers between two others is packed by one call, with a format for each set of lengths.
+that is nothing but numbers between two others is packed by one call, with a format for each set of lengths; a message
+as long as one before it is also unpacked by one (`known_form`).
 Reading accepts only what writing would produce, padding included, and makes nothing larger than the payload.
 """
 
@@ -10,28 +11,15 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator
-from itertools import groupby
+from itertools import islice
 from typing import Any
 
-from robot_io.cdr.packer import Build, Fixed, Packed, Sequence, Write, WriterCall, flattener_of, writer_of
+from robot_io.cdr.joined import joined
+from robot_io.cdr.known_form import Item, KnownForm, KnownForms, KnownPart, Values
+from robot_io.cdr.packer import Build, Fixed, Sequence, Write, WriterCall, flattener_of, writer_of
 from robot_io.cdr.shape import PRIMITIVES, Blob, Many, Nested, Scalar, Shape, Text, builder, leaves
-from robot_io.cdr.wire import (
-    HEADER_BYTES,
-    Item,
-    NotThisType,
-    Part,
-    aligned,
-    format_of,
-    read_count,
-    read_text,
-    write_blob,
-    write_count,
-    write_text,
-)
-
-_COUNT = Scalar("uint32")
-_MOST_PACKS = 1000
-"""More combinations of lengths than a run's ticks have; beyond it those kept are made anew."""
+from robot_io.cdr.variable_parts import COUNT, BlobPart, NumbersPart, TextPart
+from robot_io.cdr.wire import HEADER_BYTES, NotThisType, Part, format_of, read_count, read_text, write_count, write_text
 
 
 class Layout:
@@ -61,25 +49,44 @@ class Layout:
         # Compiled at their first use: most types of a run are never read, most of a log never written.
         self._build: Build | None = None
         self._write: Write | None = None
+        self._forms = KnownForms()
 
     def write(self, value: Any, out: bytearray) -> None:
         """Append `value` to `out`, which starts with the encapsulation header."""
         if self._write is None:
-            self._write = writer_of(_joined(self._parts), HEADER_BYTES)
+            self._write = writer_of(joined(self._parts), HEADER_BYTES)
         self._write(value, out)
 
     def read(self, payload: bytes, at: int) -> tuple[Any, int]:
         """Return the Struct found at `at` and where it ends. Raises NotThisType, struct.error or ValueError."""
         if self._build is None:
             self._build = builder(self._shape)
+        known = self._forms.at(payload, at)
+        if known is not None and (read := known.read(payload, at)) is not None:
+            return self._build(read[0]), read[1]
         found: list[Any] = []
+        end = at
         for part in self._parts:
-            at = part.read(payload, at, found)
-        return self._build(found), at
+            end = part.read(payload, end, found)
+        if not self.fixed:  # else one call has read it anyway
+            self._forms.note(payload, at, lambda: self._form(found, at))
+        return self._build(found), end
+
+    def _form(self, found: list[Any], at: int) -> KnownForm | None:
+        """Return the form of a message that was read as these values; None where one of its parts has none."""
+        values = iter(found)
+        parts = [part.known(values) for part in self._parts]
+        known = [part for part in parts if part is not None]
+        if len(known) < len(parts):
+            return None
+        items = [item for part in known for item in part.items]
+        return KnownForm(known, struct.Struct(format_of(items, (at - HEADER_BYTES) & 7)))
 
 
 class _Run(Part):
     """Numbers and fixed arrays of numbers, packed in one call."""
+
+    numeric = True
 
     def __init__(self, items: list[Item]) -> None:
         self._items = items
@@ -89,6 +96,7 @@ class _Run(Part):
             "x" in packer.format or any(scalar.ros == "bool" for _, scalar, _ in items) for packer in self._packers
         ]
         self.min_bytes = sum(PRIMITIVES[scalar.ros][1] * (count or 1) for _, scalar, count in items)
+        self._length = sum(count or 1 for _, _, count in items)
 
     def writing(self) -> Fixed:
         return Fixed([(path, count) for path, _, count in self._items])
@@ -108,74 +116,10 @@ class _Run(Part):
         found.extend(values)
         return end
 
-
-class _Text(Part):
-    """A string."""
-
-    min_bytes = 5
-
-    def __init__(self, path: str) -> None:
-        self._path = path
-
-    def writing(self) -> WriterCall:
-        return WriterCall(self._path, write_text)
-
-    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
-        text, at = read_text(payload, at)
-        found.append(text)
-        return at
-
-
-class _Blob(Part):
-    """Raw bytes."""
-
-    min_bytes = 4
-
-    def __init__(self, path: str) -> None:
-        self._path = path
-
-    def writing(self) -> WriterCall:
-        return WriterCall(self._path, write_blob)
-
-    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
-        count, at = read_count(payload, at, 1)
-        found.append(bytes(payload[at : at + count]))
-        return at + count
-
-
-class _Numbers(Part):
-    """A sequence of numbers."""
-
-    min_bytes = 4
-
-    def __init__(self, path: str, scalar: Scalar) -> None:
-        self._path = path
-        self._code, self._size = PRIMITIVES[scalar.ros]
-        self._scalar = scalar
-        self._enum = scalar.enum
-
-    def writing(self) -> Sequence:
-        return Sequence(self._path, None)
-
-    def items(self, counts: Iterator[int]) -> list[Item]:
-        count = next(counts)
-        return [("", _COUNT, None), *([("", self._scalar, count)] if count else [])]
-
-    def read(self, payload: bytes, at: int, found: list[Any]) -> int:
-        count, at = read_count(payload, at, self._size)
-        values: tuple[Any, ...] = ()
-        if count:
-            at = aligned(payload, at, self._size)
-            form = f"<{count}{self._code}"
-            values = struct.unpack_from(form, payload, at)
-            if self._code == "?" and struct.pack(form, *values) != payload[at : at + count]:
-                raise NotThisType("a bool that is neither 0 nor 1")
-            at += count * self._size
-        if self._enum is not None:
-            enum = self._enum
-            values = tuple(enum(value) for value in values)
-        found.append(values)
-        return at
+    def known(self, found: Iterator[Any]) -> KnownPart:
+        for _ in islice(found, self._length):
+            pass
+        return KnownPart(self._items)
 
 
 class _Items(Part):
@@ -192,7 +136,7 @@ class _Items(Part):
         else:
             self._write_one = write_text
             self._read = read_text
-            self._element_min = _Text.min_bytes
+            self._element_min = TextPart.min_bytes
         self.min_bytes = 4 if count is None else count * self._element_min
 
     def writing(self) -> Sequence | WriterCall:
@@ -218,29 +162,46 @@ class _Items(Part):
         found.append(tuple(values))
         return at
 
+    def known(self, found: Iterator[Any]) -> KnownPart | None:
+        empty = self._count is None and not next(found)
+        return KnownPart([COUNT], 0, tuple) if empty else None
+
 
 class _Rows(_Items):
     """A sequence of Structs that hold nothing but numbers."""
 
+    numeric = True
+
     def __init__(self, path: str, element: Nested, columns: list[Item]) -> None:
         super().__init__(path, element, None)
+        self._element = element
         self._columns = columns
 
     def writing(self) -> Sequence:
         return Sequence(self._path, flattener_of([(path, count) for path, _, count in self._columns]))
 
     def items(self, counts: Iterator[int]) -> list[Item]:
-        return [("", _COUNT, None), *(self._columns * next(counts))]
+        return [COUNT, *(self._columns * next(counts))]
+
+    def known(self, found: Iterator[Any]) -> KnownPart:
+        rows = len(next(found))
+        width = sum(count or 1 for _, _, count in self._columns)
+        build = builder(self._element)
+
+        def take(values: Values) -> tuple[Any, ...]:
+            return tuple([build(list(values[at : at + width])) for at in range(0, len(values), width)])
+
+        return KnownPart(self.items(iter((rows,))), rows, take)
 
 
 def _variable_part(path: str, leaf: Shape) -> Part:
     match leaf:
         case Text(wide=False):
-            return _Text(path)
+            return TextPart(path)
         case Blob():
-            return _Blob(path)
+            return BlobPart(path)
         case Many(Scalar() as element, None):
-            return _Numbers(path, element)
+            return NumbersPart(path, element)
         case Many(Nested() as element, None) if (columns := _fixed_items(element)) is not None:
             return _Rows(path, element, columns)
         case Many((Nested() | Text(wide=False)) as element, count):
@@ -260,33 +221,3 @@ def _fixed_items(shape: Nested) -> list[Item] | None:
             case _:
                 return None
     return items
-
-
-class _Packs(dict[tuple[int, ...], Callable[..., bytes]]):
-    """What packs some neighbouring parts, by offset modulo 8 and the number of elements of each sequence."""
-
-    def __init__(self, parts: list[Part]) -> None:
-        super().__init__()
-        self._parts = parts
-
-    def __missing__(self, key: tuple[int, ...]) -> Callable[..., bytes]:
-        if len(self) >= _MOST_PACKS:
-            self.clear()
-        start, *counts = key
-        left = iter(counts)
-        items = [item for part in self._parts for item in part.items(left)]
-        self[key] = struct.Struct(format_of(items, start)).pack
-        return self[key]
-
-
-def _joined(parts: list[Part]) -> list[Packed | WriterCall]:
-    """Return how the parts are written: neighbours that are nothing but numbers by one call."""
-    joined: list[Packed | WriterCall] = []
-    for is_numbers, group in groupby(parts, lambda part: isinstance(part, _Run | _Numbers | _Rows)):
-        together = list(group)
-        written = [part.writing() for part in together]
-        if is_numbers:
-            joined.append(Packed([one for one in written if not isinstance(one, WriterCall)], _Packs(together)))
-        else:
-            joined.extend(one for one in written if isinstance(one, WriterCall))
-    return joined

@@ -8,14 +8,12 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
+from robot_io.cdr.known_form import Item, KnownPart
 from robot_io.cdr.packer import Fixed, Sequence, WriterCall
-from robot_io.cdr.shape import PRIMITIVES, Scalar
+from robot_io.cdr.shape import PRIMITIVES
 
 HEADER_BYTES = 4
 """Alignment counts from behind these bytes of encapsulation header."""
-
-Item = tuple[str, Scalar, int | None]
-"""A number or a fixed array of numbers: its dotted path, what it is, and the array's length."""
 
 _COUNT = struct.Struct("<I")
 
@@ -28,6 +26,8 @@ class Part(ABC):
     """Some neighbouring fields of a message; `min_bytes` is the least they can take."""
 
     min_bytes: int
+    numeric = False
+    """Whether it is nothing but numbers, counts included, so that it can be packed together with its neighbours."""
 
     @abstractmethod
     def writing(self) -> Fixed | Sequence | WriterCall:
@@ -40,6 +40,10 @@ class Part(ABC):
     @abstractmethod
     def read(self, payload: bytes, at: int, found: list[Any]) -> int:
         """Append the fields found at `at` to `found`; return where they end."""
+
+    @abstractmethod
+    def known(self, found: Iterator[Any]) -> KnownPart | None:
+        """Return how long the next of the fields that were found is; None where that has no fixed form."""
 
 
 def format_of(items: list[Item], start: int) -> str:
