@@ -4,7 +4,8 @@
 
 Control's frames arrive on a SEQPACKET socket, velocities go out over the bridge; everything received from the base
 is stamped, published to control through a shared record, and pushed into the gate's own log ring. When control
-is gone, the gate sends zero for at most half a second and ends, whatever it latched before.
+is gone, or the launcher, with which the kernel kills control, the gate sends zero for at most half a second and ends,
+whatever it latched before.
 """
 
 from __future__ import annotations
@@ -55,6 +56,8 @@ class GateJob(msgspec.Struct, frozen=True):
     control_fd: int
     record_fd: int
     ring_fd: int
+    launcher_fd: int
+    """A pipe on which nothing comes but its end: the launcher's."""
     status_fd: int
     wall_offset_ns: int
     """Wall clock minus CLOCK_MONOTONIC, for stamps in the log."""
@@ -71,6 +74,7 @@ class GateProcess:
         self._status = status
         self._control = socket.socket(fileno=job.control_fd)
         self._control.setblocking(False)
+        self._launcher_fd = job.launcher_fd
         self._record_out = TypedRecord(job.record_fd, BASE_RECORD)
         self._log = GateLog(Ring(job.ring_fd).push, job.wall_offset_ns)
         self._shell = GateShell(job.limits, job.bounds, monotonic_ns())
@@ -81,6 +85,7 @@ class GateProcess:
         """Run until control is gone and zero has been sent to the base."""
         self._base.before_close = self._loop.remove_fd
         self._loop.add_fd(self._control.fileno(), self._on_control)
+        self._loop.add_fd(self._launcher_fd, self._on_launcher_gone)
         self._loop.add_fd(self._base.fileno(), self._on_base)
         self._loop.call_every(CLOCK_NS, self._on_clock)
         self._drain_base()  # what arrived during start-up: control's first record then already holds a pose
@@ -100,6 +105,12 @@ class GateProcess:
 
     def _on_control(self, _events: int) -> None:
         self._read_control()
+        self._send_due()
+
+    def _on_launcher_gone(self, _events: int) -> None:
+        """Do not wait until the kernel has taken control apart, too: that is some milliseconds of motion."""
+        self._loop.remove_fd(self._launcher_fd)
+        self._on_control_gone()
         self._send_due()
 
     def _on_base(self, _events: int) -> None:
@@ -133,7 +144,11 @@ class GateProcess:
                 frames.append(unpack_frame(payload))
             gone = not payload
         self._shell = self._shell.on_frames(frames, began_ns, monotonic_ns())
-        if gone and not self._shell.zeros_since_ns:
+        if gone:
+            self._on_control_gone()
+
+    def _on_control_gone(self) -> None:
+        if not self._shell.zeros_since_ns:
             self._loop.remove_fd(self._control.fileno())
             self._shell = self._shell.on_control_gone(monotonic_ns())
 
@@ -189,7 +204,7 @@ def main(kind: type[JobT], wrapped: Callable[[Base, JobT], Base]) -> int:
     kind: the job on stdin. wrapped: makes of the driver what the gate uses, when it has been opened.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # only control's EOF ends the gate
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # only an EOF, of control or of the launcher, ends the gate
     set_timer_slack_1ns()
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=kind)
     status = StatusPipe(job.status_fd)

@@ -49,19 +49,21 @@ class Gate:
         record_fd = os.memfd_create("record", os.MFD_CLOEXEC)
         os.ftruncate(record_fd, RECORD_BYTES)
         self._ring = Ring.create("gate", 1 << 20)
-        fds = [gate_end.fileno(), record_fd, self._ring.fd]
+        launcher_fd, self._launcher = os.pipe()
+        fds = [gate_end.fileno(), record_fd, self._ring.fd, launcher_fd]
         job = {
             "base": {"url": url},
             "frames": {**UNTURNED, "sensor_in_base_m": (0, 0, 0)},
             "kind_folder": "",
             "limits": LIMITS,
             "bounds": {"distance_m": 2.0, "moving_s": 30.0},
-            **dict(zip(("control_fd", "record_fd", "ring_fd"), fds, strict=True)),
+            **dict(zip(("control_fd", "record_fd", "ring_fd", "launcher_fd"), fds, strict=True)),
             "status_fd": -1,
             "wall_offset_ns": 0,
         }
         self.child: Child = spawn("gate", "safety.gate_process", msgspec.convert(job, GateJob), fds)
         gate_end.close()
+        os.close(launcher_fd)
         self.link = GateLink(control, record_fd)
         self.told = 0
         """How many frames it was sent."""
@@ -116,8 +118,15 @@ class Gate:
                 sent.append((record.time_ns, BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)))
         return latched, sent
 
+    def lose_launcher(self) -> None:
+        """End as the launcher does that is killed."""
+        if self._launcher >= 0:
+            os.close(self._launcher)
+            self._launcher = -1
+
     def close(self) -> None:
         self.link.close()
+        self.lose_launcher()
         self.child.end(3.0)
         self.child.close()
         self._ring.close()
@@ -180,6 +189,25 @@ def test_a_base_that_still_reads_rest_is_not_yet_believed(tmp_path, host, bridge
         gate.tell(SLOW)
         gate.hang_up()
         check_last_zeros(gate, host, 80.0, 400.0)  # two ticks, and no half second for a base that rests
+
+
+@repeated_when_the_host_stalls
+def test_a_killed_launcher_ends_motion_before_the_kernel_has_killed_control(tmp_path, host, bridge):
+    with running_gate(bridge) as gate:
+        gate.tell_for(ZERO, 100)
+        gate.tell_for(SLOW, 100)
+        gone_ns = time.monotonic_ns()
+        gate.lose_launcher()
+        assert until(lambda: gate.child.process.poll() is not None), "the gate did not end"
+        latched_ns, sent = gate.log()
+    if latched_ns[0] < gone_ns:  # silent for 50 ms, said the gate
+        blame_the_host(host, gone_ns - 200 * MS)
+    assert SLOW in {twist for _, twist in sent}
+    first_zero_ms = (next(t_ns for t_ns, twist in sent if t_ns >= gone_ns and twist == ZERO) - gone_ns) / MS
+    if first_zero_ms > 5.0:
+        blame_the_host(host, gone_ns)
+    assert first_zero_ms <= 5.0  # it waits for nothing but its processor
+    assert {twist for t_ns, twist in sent if t_ns >= gone_ns + 5 * MS} == {ZERO}
 
 
 @repeated_when_the_host_stalls

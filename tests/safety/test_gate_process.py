@@ -61,6 +61,7 @@ class Rig:
         self.ring = Ring.create("gate", 1 << 16)
         self.base = Base(self.clock)
         self.status, status = os.pipe()
+        self.launcher, self.launcher_end = os.pipe()
         job = GateJob(
             BaseConfig(),
             FRAMES,
@@ -70,6 +71,7 @@ class Rig:
             gate_end.detach(),
             self.record_out.fd,
             self.ring.fd,
+            self.launcher,
             status,
             wall_offset_ns=0,
         )
@@ -104,6 +106,8 @@ def rig(monkeypatch) -> Iterator[Rig]:
     rig.control.close()
     rig.ring.close()
     os.close(rig.status)
+    os.close(rig.launcher)
+    os.close(rig.launcher_end)
     os.close(rig.gate._status._fd)
 
 

@@ -119,6 +119,7 @@ class Launcher:
             forget()
             for child in self._children.values():
                 child.close()
+            self._processes.close()
 
     @property
     def began(self) -> bool:

@@ -7,6 +7,7 @@
     records            gate -> control, arm -> control               memfd, newest wins
     pidfds             gate, arm, recorder -> control                readable when the process has ended
     run pipe           control -> arm, emulators                     nothing is written: EOF means control has ended
+    launcher pipe      launcher -> gate                              nothing is written: EOF means it has ended
     live feed          recorder -> live                              SEQPACKET, with --live; drops, nobody waits
     operator pipe      launcher -> control                           a byte each: go, stop, pause, ..., alive
     status pipes       each of them -> launcher                      JSON lines
@@ -88,7 +89,7 @@ class Processes:
         self._rings = {name: Ring.create(f"{name}-log", size) for name, size in RING_BYTES.items()}
         self._alive = {name: os.pipe() for name in RING_BYTES}
         self._run = os.pipe()
-        self._operator_fd = -1
+        self._operator_fd = self._launcher_fd = -1
         self.children: dict[str, Child] = {}
 
     @property
@@ -120,13 +121,15 @@ class Processes:
         control_end, gate_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         operator_read, self._operator_fd = os.pipe()
         os.set_blocking(self._operator_fd, False)
+        launcher_read, self._launcher_fd = os.pipe()
         self._start_recorder(config_text)
-        self._start_gate(rig, gate_end.fileno(), base.fd)
+        self._start_gate(rig, gate_end.fileno(), base.fd, launcher_read)
         self._start_arm(rig, arm.fd)
         self._start_control(rig, control_end.fileno(), base.fd, arm.fd, operator_read)
         control_end.close()
         gate_end.close()
         os.close(operator_read)
+        os.close(launcher_read)
         for read_end, write_end in (*self._alive.values(), self._run):
             os.close(read_end)
             os.close(write_end)
@@ -150,6 +153,12 @@ class Processes:
         if self._operator_fd >= 0:
             os.close(self._operator_fd)
             self._operator_fd = -1
+
+    def close(self) -> None:
+        """Close what shows the gate that the launcher lives, once all have ended; idempotent."""
+        if self._launcher_fd >= 0:
+            os.close(self._launcher_fd)
+            self._launcher_fd = -1
 
     def _spawn(self, name: str, module: str, job: msgspec.Struct, fds: list[int]) -> None:
         self._adopt(spawn(name, module, job, fds))
@@ -180,17 +189,19 @@ class Processes:
             job = replace(job, live_fd=feed.fileno())
             self._spawn("recorder", "tools.run.recorder", job, [*fds, feed.fileno()])
 
-    def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int) -> None:
+    def _start_gate(self, rig: RigConfig, control_fd: int, record_fd: int, launcher_fd: int) -> None:
         limits = SafetySettings.of(rig).envelope
         bounds = total_bounds(rig)
         ring_fd = self._rings["gate"].fd
+        fds = [control_fd, record_fd, ring_fd, launcher_fd]
         job = GateJob(
-            rig.base, rig.frames, self._kind_folder, limits, bounds, control_fd, record_fd, ring_fd, -1, self._offset_ns
+            *(rig.base, rig.frames, self._kind_folder, limits, bounds),
+            *(control_fd, record_fd, ring_fd, launcher_fd, -1, self._offset_ns),
         )
         module = "safety.gate_process"
         if faults := faults_of(rig, "base"):
             job, module = InjectedGateJob(**asdict(job), faults=faults), "tools.run.injected_gate"
-        self._spawn("gate", module, job, [control_fd, record_fd, ring_fd, self._alive["gate"][1]])
+        self._spawn("gate", module, job, [*fds, self._alive["gate"][1]])
 
     def _start_arm(self, rig: RigConfig, record_fd: int) -> None:
         if not is_shipped("arm", rig.arm.kind):
