@@ -26,7 +26,10 @@ from tools.terminal.arguments import named_path, number, whole_number
 
 BUDGET_S = 570.0
 """The command ends within ten minutes."""
-FULL_START_S = 6.0
+FULL_START_S, BARE_START_S = 7.0, 0.4
+"""What a measurement takes beside its duration."""
+PLANNED = 5
+"""Rounds for which there is to be time, as some are dropped."""
 LEAST_S = 3.0
 LEAST_HZ, MOST_HZ = 50.0, 500.0
 PLAIN, SPIN = "", ", spin"
@@ -103,10 +106,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _duration_s(args: argparse.Namespace, reference: str) -> float:
-    """Return the length of a measurement with which three rounds of all rates fit into the time."""
+    """Return the length of a measurement with which five rounds of all rates fit into the time."""
     measured = (reference == "cyclictest") + 2 + 2 * args.full_stack
-    extra_s = 2 * FULL_START_S * args.full_stack
-    fits_s = (BUDGET_S / (len(args.rate) * WANTED) - extra_s) / measured
+    extra_s = 2 * BARE_START_S + 2 * FULL_START_S * args.full_stack
+    fits_s = (BUDGET_S / (len(args.rate) * PLANNED) - extra_s) / measured
     return float(min(args.duration_s, max(LEAST_S, int(fits_s))))
 
 
@@ -137,6 +140,9 @@ def rows_of(rate_hz: float, rounds: Rounds, given: Given) -> list[dict[str, Any]
         row: dict[str, Any] = {
             "rate_hz": rate_hz, "spin_us": spin_us, "loop": "full" if given.full_stack else "bare",
             "reference": given.reference, "rounds_kept": rounds.count, "rounds_run": rounds.run,
+            "kept_share": round(rounds.kept_shares[loop], 3),
+            "bare_kept_share": round(rounds.kept_shares[f"bare{word}"], 3),
+            "reference_kept_share": round(rounds.kept_shares[given.reference], 3),
         }  # fmt: skip
         if not rounds.too_noisy:
             best = {name: best_of(kept) for name, kept in rounds.kept.items()}
@@ -150,7 +156,7 @@ def rows_of(rate_hz: float, rounds: Rounds, given: Given) -> list[dict[str, Any]
 def _figures(loop: Best, alone: Best, reference: Best) -> dict[str, Any]:
     return {
         "p50_us": round(loop.p50_us, 1), "p99_us": round(loop.p99_us, 1), "max_us": round(loop.max_us, 1),
-        "skipped": loop.skipped,
+        "skipped": loop.skipped, "skipped_stolen": loop.skipped_stolen,
         "bare_p50_us": round(alone.p50_us, 1), "bare_p99_us": round(alone.p99_us, 1),
         "reference_p50_us": round(reference.p50_us, 1), "reference_p99_us": round(reference.p99_us, 1),
         "ratio_p50": _ratio(loop.p50_us, reference.p50_us), "ratio_p99": _ratio(loop.p99_us, reference.p99_us),
@@ -196,14 +202,19 @@ def _aims(row: Mapping[str, Any]) -> dict[str, float]:
 
 def _print(rows: list[dict[str, Any]], found: dict[float, Rounds], got: RealtimeFacts, words: str) -> None:
     tell("")
-    tell(f"{'Hz':>5}  {'column':12} {'p50':>8} {'p99':>8} {'worst':>9}  us after the deadline, best of the kept rounds")
+    tell(f"{'Hz':>5}  {'column':12} {'p50':>8} {'p99':>8} {'worst':>9} {'kept':>5}  us after the deadline, best round")
     for rate_hz, rounds in found.items():
         if rounds.too_noisy:
             tell(f"{rate_hz:5g}  too noisy: {rounds.count} of {rounds.run} rounds kept, {WANTED} needed")
-            continue
         for name, kept in rounds.kept.items():
+            share = f"{rounds.kept_shares[name]:.0%}"
+            if rounds.too_noisy:
+                tell(f"{rate_hz:5g}  {name:12} {'-':>8} {'-':>8} {'-':>9} {share:>5}")
+                continue
             best = best_of(kept)
-            tell(f"{rate_hz:5g}  {name:12} {best.p50_us:8.1f} {best.p99_us:8.1f} {best.max_us:9.1f}")
+            tell(f"{rate_hz:5g}  {name:12} {best.p50_us:8.1f} {best.p99_us:8.1f} {best.max_us:9.1f} {share:>5}")
+            if best.skipped + best.skipped_stolen:
+                tell(f"{'':21}skipped {best.skipped} ticks, and {best.skipped_stolen} while the host took time")
     for row in rows:
         if "stages_us" in row:
             stages = ", ".join(f"{name} {us:g}" for name, us in row["stages_us"].items())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import time
 
 import pytest
 
@@ -11,6 +13,7 @@ from robot_io.ipc.realtime import RealtimeFacts
 from tools.bench import loop as bench_loop
 from tools.bench.clock import bare, cyclictest, full_stack
 from tools.bench.clock.rounds import run_rounds, steal_ticks
+from tools.bench.clock.stolen import Window
 from tools.bench.clock.wakeups import Wakeups, best_of
 from tools.cli import main
 
@@ -45,12 +48,17 @@ def test_the_histogram_of_cyclictest_is_read_with_what_lies_beyond_it():
 
 def test_the_best_of_rounds_is_taken_figure_by_figure():
     best = best_of([made(50.0, 300.0, 1), made(60.0, 200.0), made(55.0, 900.0, 4)])
-    assert (best.p50_us, best.p99_us, best.max_us, best.skipped) == (50.0, 200.0, 200.0, 0)
+    assert (best.p50_us, best.p99_us, best.max_us, best.skipped) == (50.0, 200.0, 200.0, 5)
 
 
 def test_steal_is_the_eighth_number_of_the_first_line():
     assert steal_ticks("cpu  10 2 3 4 5 6 7 81 9 10\ncpu0 1 1 1 1 1 1 1 1\n") == 81
     assert steal_ticks("cpu  10 2 3 4\n") == 0
+
+
+def unwatched() -> contextlib.AbstractContextManager[list[Window]]:
+    """Watch nothing: of these wake-ups no times are known (test_bench_stolen.py has those that have times)."""
+    return contextlib.nullcontext([])
 
 
 def rounds_of(stolen: list[int], deadline_s: float = 1e9):
@@ -62,7 +70,7 @@ def rounds_of(stolen: list[int], deadline_s: float = 1e9):
         time_s[0] += 10.0
         return made(50.0, 90.0)
 
-    return run_rounds({"bare": column}, deadline_s, steal=lambda: total[0], clock=lambda: time_s[0])
+    return run_rounds({"bare": column}, deadline_s, steal=lambda: total[0], watch=unwatched, clock=lambda: time_s[0])
 
 
 def test_rounds_from_which_the_host_took_time_are_dropped():
@@ -93,7 +101,7 @@ def measured(monkeypatch):
         full_stack, "measure", lambda _rate, _s, spin, _cpu: made(*times["full, spin" if spin else "full"], **loop)
     )
     monkeypatch.setattr(bench_loop, "run_rounds", lambda columns, deadline_s, say: run_rounds(
-        columns, deadline_s, steal=lambda: 0, say=say
+        columns, deadline_s, steal=lambda: 0, watch=unwatched, say=say
     ))  # fmt: skip
     return times
 
@@ -114,6 +122,8 @@ def test_the_json_has_every_figure(measured, capsys):
     assert (plain["bare_ratio_p50"], plain["bare_ratio_p99"]) == (1.2, 1.11)
     assert (plain["rounds_kept"], plain["skipped"], plain["to_gate_p50_us"]) == (3, 0, 250.0)
     assert plain["stages_us"]["fold"] == 150.0
+    assert (plain["kept_share"], plain["bare_kept_share"], plain["reference_kept_share"]) == (1.0, 1.0, 1.0)
+    assert plain["skipped_stolen"] == 0
     assert (spun["p50_us"], spun["ratio_p50"], spun["ratio_p99"]) == (40.0, 1.33, 1.83)
     assert found["realtime"]["spin_us"] == 150.0
     assert "cyclictest" in err
@@ -133,13 +143,14 @@ def test_what_lies_above_an_aim_is_named_with_its_rate(measured, capsys):
 def test_too_few_quiet_rounds_give_no_ratio(measured, monkeypatch, capsys):
     stolen = iter(range(0, 10_000, 100))
     monkeypatch.setattr(bench_loop, "run_rounds", lambda columns, deadline_s, say: run_rounds(
-        columns, deadline_s, steal=lambda: next(stolen), say=say
+        columns, deadline_s, steal=lambda: next(stolen), watch=unwatched, say=say
     ))  # fmt: skip
     assert main(["bench", "loop", "--rate", "100", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "too noisy"
     assert all(row["rounds_kept"] == 0 and row["rounds_run"] == 6 for row in found["rates"])
     assert all("ratio_p50" not in row for row in found["rates"])
+    assert all(row["kept_share"] == 0.0 for row in found["rates"])
 
 
 def test_without_cyclictest_the_bare_loop_is_the_reference(measured, monkeypatch, capsys):
@@ -184,15 +195,26 @@ def test_the_picture_is_written(measured, tmp_path, capsys):
 
 
 def test_a_bare_loop_counts_every_period_once():
+    before_ns = time.monotonic_ns()
     found, got = bare.measure(bare.BareJob(rate_hz=100.0, duration_s=0.3, priority=80, cpu=-1, spin_us=150.0))
     assert len(found.late_us) + found.skipped == 30
     assert found.late_us[0] >= 0.0
+    woken_ns = [span.woken_ns for span in found.spans]
+    assert len(woken_ns) == len(found.late_us)
+    assert all(before_ns < ns < time.monotonic_ns() for ns in woken_ns)
+    assert [round((span.woken_ns - span.due_ns - span.skipped * 10_000_000) * 1e-3, 3) for span in found.spans] == [
+        round(us, 3) for us in found.late_us
+    ]
     assert got.spin_us in (0.0, 150.0)
 
 
 @pytest.mark.long
 def test_a_complete_run_says_where_its_time_goes():
+    before_ns = time.monotonic_ns()
     found = full_stack.measure(100.0, 3.0, 150.0)
+    woken_ns = sorted(span.woken_ns for span in found.spans)
+    assert before_ns < woken_ns[0] < woken_ns[-1] < time.monotonic_ns()
+    assert woken_ns[-1] - woken_ns[0] == pytest.approx((len(woken_ns) - 1 + found.skipped) * 10_000_000, abs=20_000_000)
     assert len(found.late_us) > 300
     assert set(found.facts["stages_us"]) == {"wake", "input", "fold", "send", "record"}
     assert all(us > 0.0 for us in found.facts["stages_us"].values())

@@ -17,7 +17,7 @@ from robot_io.errors import EnvironmentFault
 from robot_io.ipc.event_loop import EventLoop
 from robot_io.ipc.process import die_with_parent, fresh_interpreter
 from robot_io.ipc.realtime import RealtimeFacts, set_up_realtime
-from tools.bench.clock.wakeups import Wakeups
+from tools.bench.clock.wakeups import Tick, Wakeups, timed
 
 
 class BareJob(msgspec.Struct, frozen=True):
@@ -29,12 +29,16 @@ class BareJob(msgspec.Struct, frozen=True):
     cpu: int
     spin_us: float
 
+    @property
+    def period_ns(self) -> int:
+        """Return the time from deadline to deadline."""
+        return round(NS_PER_S / self.rate_hz)
+
 
 class BareResult(msgspec.Struct, frozen=True):
     """What it found."""
 
-    late_ns: list[int]
-    skipped: int
+    ticks: list[Tick]
     realtime: RealtimeFacts
 
 
@@ -42,8 +46,8 @@ class BareLoop:
     """Wakes up on a grid of deadlines, `ticks` times, and notes how late."""
 
     def __init__(self, period_ns: int, ticks: int, spin_ns: int) -> None:
-        self.late_ns: list[int] = []
-        self.skipped = 0
+        self.ticks: list[Tick] = []
+        self._skipped = 0
         self._period_ns, self._ticks, self._spin_ns = period_ns, ticks, spin_ns
         self._loop = EventLoop()
 
@@ -60,9 +64,9 @@ class BareLoop:
         deadline_ns = woken_ns + self._spin_ns
         paced = wake(deadline_ns, self._period_ns, spin_until(deadline_ns, monotonic_ns))
         self._sleep_until(paced.next_deadline_ns)
-        self.late_ns.append(paced.late_ns)
-        self.skipped += paced.skipped
-        if len(self.late_ns) + self.skipped >= self._ticks:
+        self.ticks.append(Tick(paced.deadline_ns + paced.late_ns, paced.late_ns, paced.skipped))
+        self._skipped += paced.skipped
+        if len(self.ticks) + self._skipped >= self._ticks:
             self._loop.stop()
 
 
@@ -78,7 +82,8 @@ def measure(job: BareJob) -> tuple[Wakeups, RealtimeFacts]:
             f"the bare loop failed: {done.stderr.decode(errors='replace').strip()[-200:]}", where="push bench loop"
         )
     found = msgspec.json.decode(done.stdout, type=BareResult)
-    return Wakeups(tuple(sorted(ns * 1e-3 for ns in found.late_ns)), found.skipped), found.realtime
+    skipped = sum(tick.skipped for tick in found.ticks)
+    return timed(found.ticks, job.period_ns, skipped, {}), found.realtime
 
 
 def main() -> int:
@@ -86,12 +91,12 @@ def main() -> int:
     die_with_parent()
     job = msgspec.json.decode(sys.stdin.buffer.read(), type=BareJob)
     got = set_up_realtime(job.priority, cpu=job.cpu, spin_us=job.spin_us)
-    loop = BareLoop(round(NS_PER_S / job.rate_hz), round(job.duration_s * job.rate_hz), round(got.spin_us * 1e3))
+    loop = BareLoop(job.period_ns, round(job.duration_s * job.rate_hz), round(got.spin_us * 1e3))
     gc.collect()
     gc.freeze()
     gc.disable()
     loop.run()
-    sys.stdout.buffer.write(msgspec.json.encode(BareResult(loop.late_ns, loop.skipped, got)))
+    sys.stdout.buffer.write(msgspec.json.encode(BareResult(loop.ticks, got)))
     return 0
 
 

@@ -9,11 +9,12 @@ import sys
 import tempfile
 from pathlib import Path
 
+from robot_io.clock import NS_PER_S
 from robot_io.errors import EnvironmentFault
 from robot_io.ipc.realtime import NO_CPU
-from robot_io.log.signals import SIGNALS
 from robot_io.mcap.read import read_log
-from tools.bench.clock.wakeups import Wakeups
+from robot_io.tick import TICK_CDR
+from tools.bench.clock.wakeups import Tick, Wakeups, timed
 
 TARE_S = 1.0
 STANDING_S = 6.0
@@ -43,20 +44,22 @@ def measure(rate_hz: float, duration_s: float, spin_us: float, cpu: int = NO_CPU
             env=os.environ | {"XDG_STATE_HOME": folder},  # the user's saved tare is not changed
             stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=duration_s + 120.0, check=False,
         )  # fmt: skip
-        return _read(out, done.stderr)
+        return _read(out, done.stderr, round(NS_PER_S / rate_hz))
 
 
-def _read(out: Path, stderr: str) -> Wakeups:
+def _read(out: Path, stderr: str, period_ns: int) -> Wakeups:
     """Return the wake-ups of a run. A run that its safety ended is as good as any: its loop ran."""
     try:
         loop = json.loads((out / "summary.json").read_text())["loop"]
-        late = [
-            SIGNALS.decode(message.payload).wake_late_us
-            for message in read_log(out / "run.mcap")
-            if message.topic == "/control/signals"
-        ]
+        ticks = [_tick(message.payload) for message in read_log(out / "run.mcap") if message.topic == "/control/tick"]
     except (OSError, KeyError):
-        late, loop = [], {}
-    if not late:
+        ticks, loop = [], {}
+    if not ticks:
         raise EnvironmentFault(f"the run failed: {stderr.strip()[-300:]}", where="push bench loop")
-    return Wakeups(tuple(sorted(late)), int(loop["skipped"]), loop)
+    return timed(ticks, period_ns, int(loop["skipped"]), loop)
+
+
+def _tick(payload: bytes) -> Tick:
+    """Return when a tick woke up. `now_ns` is a little later (the devices are read first), on the run's own clock."""
+    inp = TICK_CDR.decode(payload).input
+    return Tick(inp.now_ns, inp.host.late_ns, inp.host.skipped)
