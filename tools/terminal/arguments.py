@@ -9,10 +9,12 @@ from pathlib import Path
 
 
 def name_or_path(text: str) -> str:
-    """Return a name as it is, and a path with `~` replaced. Raises ArgumentTypeError for the home of nobody.
+    """Return a name as it is, and a path with `~` replaced. Raises ArgumentTypeError for "" and for the home of nobody.
 
-    The shell leaves the sign in `--out=~/x`, and within quotes.
+    The shell leaves the sign in `--out=~/x`, and within quotes; of a variable that is not set it leaves nothing.
     """
+    if not text:
+        raise ArgumentTypeError("an empty name is no file or folder; the current folder is `.`")
     if not text.startswith("~"):
         return text
     try:
@@ -23,7 +25,7 @@ def name_or_path(text: str) -> str:
 
 
 def named_path(text: str) -> Path:
-    """Return a path with `~` replaced. Raises ArgumentTypeError for the home of nobody."""
+    """Return a path with `~` replaced. Raises ArgumentTypeError as `name_or_path`."""
     return Path(name_or_path(text))
 
 
