@@ -75,7 +75,9 @@ def _write_readings(path: Path, raw: Raw) -> Path:
     try:
         write_new(path, raw.text().encode())
     except OSError as error:
-        raise EnvironmentFault(f"the readings cannot be written: {error.strerror}", where=str(path)) from None
+        raise EnvironmentFault(
+            f"the readings cannot be written: {error.strerror}", where=str(path), do="Give another --out"
+        ) from None
     return path
 
 
