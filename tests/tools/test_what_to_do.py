@@ -44,3 +44,17 @@ def test_the_sentence_ends_with_what_to_do(argv, do, tmp_path, monkeypatch, caps
     assert cli.main(argv) == 2
     assert capsys.readouterr().err.splitlines()[-1].endswith(f". {do}")
     assert not list(tmp_path.iterdir())
+
+
+def test_two_numbers_in_the_wrong_order_are_told_the_order(capsys):
+    assert cli.main(["tune", "--size-m=0.6,0.3"]) == 2
+    assert "`0.6,0.3` is not LOW,HIGH with both from 0.01 to 10, the lower first" in capsys.readouterr().err
+
+
+def test_a_grid_that_is_absent_is_named_once(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["sweep", "absent.toml"]) == 2
+    said = capsys.readouterr().err
+    assert said == (
+        "push: absent.toml: this grid cannot be read: No such file or directory. Give `paper` or a TOML file\n"
+    )

@@ -76,7 +76,8 @@ def pair(low: float, high: float, names: str, *, rising: bool = False) -> Callab
             or not all(low <= value <= high for value in values)
             or (rising and values != sorted(values))
         ):
-            raise ArgumentTypeError(f"`{text}` is not {names} with both from {low:g} to {high:g}")
+            order = ", the lower first" if rising else ""
+            raise ArgumentTypeError(f"`{text}` is not {names} with both from {low:g} to {high:g}{order}")
         return values[0], values[1]
 
     return read
