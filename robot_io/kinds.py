@@ -36,6 +36,8 @@ PARTS_OF = {
 ATTRIBUTES_OF = {"base": ("before_close", "sent_ns", "newest_inbound_ns", "newest_pong_ns")}
 """What a run reads of a driver that was built."""
 PAGE = "docs/add-a-device.md shows what a driver needs"
+NOT_FOUND = "Put its folder on PYTHONPATH, or the file beside the rig file"
+NOT_SOUND = "Correct the module, or the name of its class"
 
 
 def find_kind(device: str, kind: str, folder: str = "") -> type[Any]:
@@ -62,7 +64,7 @@ def find_kind(device: str, kind: str, folder: str = "") -> type[Any]:
         raise ConfigError(
             f"`{kind}` cannot be imported: {reason}",
             where=where,
-            do="Put its folder on PYTHONPATH, or the file beside the rig file",
+            do=NOT_FOUND if isinstance(error, ModuleNotFoundError) else NOT_SOUND,
         ) from error
     missing = [part for part in PARTS_OF[device] if not hasattr(found, part)]
     if not isinstance(found, type) or missing:

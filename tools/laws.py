@@ -25,6 +25,7 @@ from control.laws.state_fields import StateFields
 from robot_io.errors import ConfigError, PushError
 from robot_io.ipc.spawn import spawn
 from robot_io.ipc.status import StatusPipe
+from robot_io.kinds import NOT_FOUND, NOT_SOUND
 from robot_io.rig.config import ControlConfig, RigConfig
 from robot_io.rig.types import LawFacts
 
@@ -108,7 +109,7 @@ def find_law(law: str, folder: str) -> type[Any]:
         raise ConfigError(
             f"`{law}` cannot be imported: {_reason(error)}",
             where="control.law",
-            do="Put its folder on PYTHONPATH, or the file beside the rig file",
+            do=NOT_FOUND if isinstance(error, ModuleNotFoundError) else NOT_SOUND,
         ) from error
     if not isinstance(found, type):
         raise ConfigError(f"`{law}` is not a class", where="control.law", do=PAGE)

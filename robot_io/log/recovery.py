@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -33,7 +34,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
     if out_path.exists():
         raise UsageError("there is already a file of this name", where=str(out_path), do="Give another name with --out")
     items = walk(path, finished=False)
-    first = next(items)  # the header; nothing is created for a file that is not a log
+    first = _header(items, path)  # nothing is created for a file that is not a log
     assert isinstance(first, Header)
     stream = create_new(out_path)
     try:
@@ -48,7 +49,7 @@ def recover(path: Path, out_path: Path) -> Recovered:
         if not cause:
             raise UsageError("the log is intact; there is nothing to recover", where=str(path))
         if copy.seal.messages == 0:
-            raise LogDamaged(f"no message can be saved: {cause}", where=str(path))
+            raise _nothing_saved(path, cause)
         copy.writer.flush()
         facts = {"source": path.name, "cause": cause, **copy.seal.facts(), **config_seal(copy.config)}
         copy.writer.add_metadata(RECOVERED_METADATA, facts)
@@ -65,6 +66,20 @@ def recover(path: Path, out_path: Path) -> Recovered:
             ) from None
         raise
     return Recovered(copy.seal.messages, cause)
+
+
+def _header(items: Iterator[LogItem], path: Path) -> LogItem:
+    try:
+        return next(items)
+    except LogDamaged as damage:
+        if "push log recover" in damage.do:  # which is what runs here
+            raise _nothing_saved(path, damage.what) from None
+        raise
+
+
+def _nothing_saved(path: Path, cause: str) -> LogDamaged:
+    do = "If the run is over, take another copy of it"
+    return LogDamaged(f"no message can be saved: {cause}", where=str(path), do=do)
 
 
 class LogCopy:

@@ -56,7 +56,7 @@ class FtConfig(Table, frozen=True):
     level: Level = "emulated"
     port: str = ""
     tare_s: Annotated[float, Meta(ge=0.2, le=10)] = 5.0
-    """How long the tare is averaged. With 1 s an FT 300's noise leaves 0.12 N of error: 0.1 m beside the path."""
+    """How long the tare is averaged. With 1 s an FT 300's noise leaves 0.12 N of error: 5 cm beside the path."""
     noise_force_N: NonNegative | None = None
     """Noise of the sensor, one standard deviation of a force axis; without it what the kind declares (FT 300: 1.2)."""
     noise_torque_Nm: NonNegative | None = None

@@ -42,7 +42,7 @@ def find(name_or_path: str | Path) -> Path:
     if _is_file(path):
         return path
     if path.suffix == ".toml" or "/" in text:
-        raise ConfigError("there is no such rig file", where=text)
+        raise ConfigError("there is no such rig file", where=text, do="Check the name")
     near = difflib.get_close_matches(text, shipped, n=1)
     hint = f"Did you mean `{near[0]}`? " if near else ""
     raise ConfigError(

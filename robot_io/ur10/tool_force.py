@@ -44,7 +44,8 @@ NOT_STREAMING = "it does not stream: call start()"
 class UrToolForce(DriverBase):
     """The sensor of an e-Series arm: 500 readings a second of force (N) and torque (N*m) in the SENSOR frame.
 
-    host: the arm's controller. model: which arm it must be (`"UR10e"`); empty for any.
+    host: the arm's controller.
+    model: which arm it must be (`"UR10e"`); empty for any.
 
     `ft_raw_wrench` where the controller has it (PolyScope 5.9), else `actual_TCP_force`. For one thread at a time, and
     it starts none; to wait for readings, `select` on the driver itself.

@@ -64,6 +64,20 @@ def test_no_folder_of_that_name_is_made(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "~").exists()
 
 
+@pytest.mark.parametrize("name", PATHS)
+def test_an_empty_path_is_refused_and_does_not_mean_the_current_folder(name):
+    with pytest.raises(argparse.ArgumentTypeError, match="an empty name"):
+        OPTIONS[name].type("")
+
+
+def test_nothing_is_written_where_the_name_is_empty(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for argv in (["run", "sim", "--fast", "--distance-m=0.1", "--out="], ["run", ""], ["replay", ""]):
+        assert cli.main(argv) == 2
+        assert "an empty name" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_user_who_is_not_there(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["report", "a.mcap", "--out=~nobody-of-this-name/x"]) == 2

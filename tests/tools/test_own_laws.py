@@ -73,7 +73,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("law", "words"),
     [
-        ("Missing", "cannot be imported: AttributeError"),
+        ("Missing", "cannot be imported: AttributeError.*name of its class"),
         ("nothing", "is not a class"),
         ("Bare", "lacks `name`, `Settings`, `State`, `initial`, `step`"),
         ("Worded", "neither float, int, bool"),

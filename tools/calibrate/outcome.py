@@ -23,6 +23,13 @@ from tools.places.fragment import Fragment, default_path, write_fragment
 from tools.rig import devices_at
 
 SCHEMA = 1
+ORDER = {
+    "bias": "fx, fy, fz, mx, my, mz of the sensor",
+    "contact": "ahead, left",
+    "marker": "ahead, left, turned to the left",
+    "path": "x, y, direction",
+}
+"""What the values of an estimate of several are."""
 
 
 class Saved(NamedTuple):
@@ -75,7 +82,9 @@ def _write_readings(path: Path, raw: Raw) -> Path:
     try:
         write_new(path, raw.text().encode())
     except OSError as error:
-        raise EnvironmentFault(f"the readings cannot be written: {error.strerror}", where=str(path)) from None
+        raise EnvironmentFault(
+            f"the readings cannot be written: {error.strerror}", where=str(path), do="Give another --out"
+        ) from None
     return path
 
 
@@ -110,12 +119,14 @@ def as_json(found: Estimate, written: Saved, logs: Sequence[Path]) -> dict[str, 
 
 
 def lines(found: Estimate, written: Saved, apply: Path | None) -> list[str]:
-    """Return what people are told: each value with its uncertainty, then the rest."""
+    """Return what people are told: each value with its uncertainty, what several are, then the rest."""
     units = found.unit.split(", ")
     told = [
         f"{found.what}: {value:+.4f} {unit} +- {uncertainty:.2g} (k = 2)"
         for value, uncertainty, unit in zip(found.value, found.uncertainty, units * len(found.value), strict=False)
     ]
+    if found.what in ORDER:
+        told.append(f"in this order: {ORDER[found.what]}")
     told += [f"by {found.source}", *found.told, f"written to {written.fragment}"]
     if written.kept is not None:
         told.append(f"{apply} includes it now; as it was: {written.kept.name}")

@@ -25,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="show: print every value; check: only report whether it is valid; schema: a JSON Schema for editors",
     )
     parser.add_argument("rig", nargs="?", type=name_or_path, help=f"{', '.join(shipped_rigs())}, or a path (emulated)")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one value, repeatable")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig, repeatable"
+    )
     parser.add_argument("--origin", action="store_true", help="show: also say where each value was written")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
 

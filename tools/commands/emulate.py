@@ -89,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "rig", nargs="?", type=name_or_path, default="emulated", help="whose world: a shipped name or a path (emulated)"
     )
     everything.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig"
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig, repeatable"
     )
     everything.add_argument("--seed", type=SEED, metavar="SEED", default=0, help="varies the start and the noise (0)")
     everything.add_argument("--arm-host", type=_loopback, default=ARM_HOST, help=f"127.x.y.z ({ARM_HOST})")

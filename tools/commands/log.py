@@ -148,7 +148,9 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
         with _removed_on_failure(out, files, made=made):
             _write_tables(decoders, args.log, out, summary.start_ns, files)
     except OSError as error:
-        raise EnvironmentFault(f"the tables cannot be written: {error.strerror}", where=str(out)) from None
+        raise EnvironmentFault(
+            f"the tables cannot be written: {error.strerror}", where=str(out), do="Give another --out"
+        ) from None
     for name, rows in files.items():
         tell(f"{out / name}: {rows} rows")
     return {"out": str(out), "files": files, "unreadable": _report_unreadable(decoders, args, sum(files.values()))}
@@ -168,7 +170,9 @@ def _export_signals(args: argparse.Namespace) -> dict[str, Any]:
             out.unlink(missing_ok=True)
             raise
     except OSError as error:
-        raise EnvironmentFault(f"the table cannot be written: {error.strerror}", where=str(out)) from None
+        raise EnvironmentFault(
+            f"the table cannot be written: {error.strerror}", where=str(out), do="Give another --out"
+        ) from None
     tell(f"{out}: {rows} rows")
     return {"out": str(out), "rows": rows}
 
@@ -260,7 +264,9 @@ def _copy_new(file: Path, target: Path) -> None:
         shutil.copyfile(file, target)
     except OSError as error:
         target.unlink(missing_ok=True)
-        raise EnvironmentFault(f"the log cannot be written: {error.strerror}", where=str(target)) from None
+        raise EnvironmentFault(
+            f"the log cannot be written: {error.strerror}", where=str(target), do="Give another --out"
+        ) from None
 
 
 def _report_unreadable(decoders: Decoders, args: argparse.Namespace, messages: int) -> dict[str, str]:

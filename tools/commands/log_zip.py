@@ -39,7 +39,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         packed = pack(logs, top, out, (_user(), *platform.node().split(".")))
     except OSError as error:
         out.unlink(missing_ok=True)
-        raise EnvironmentFault(f"the zip cannot be written: {error.strerror}", where=str(out)) from None
+        raise EnvironmentFault(
+            f"the zip cannot be written: {error.strerror}", where=str(out), do="Give another --out"
+        ) from None
     except BaseException:
         out.unlink(missing_ok=True)
         raise

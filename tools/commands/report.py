@@ -104,7 +104,9 @@ def write_page(log: Path, args: argparse.Namespace) -> list[Path]:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EnvironmentFault(f"the report cannot be written: {error.strerror}", where=str(out)) from None
+        raise EnvironmentFault(
+            f"the report cannot be written: {error.strerror}", where=str(out), do="Give another --out"
+        ) from None
     kept = [out / name for name in FILMS if (out / name).exists() and not (out / "report.html").exists()]
     if kept and (args.gif or args.mp4):
         raise UsageError("there is already a file of this name", where=str(kept[0]), do="Give another --out")

@@ -176,7 +176,11 @@ def check_flags(args: argparse.Namespace, rig: RigConfig) -> None:
     if blind and not (args.drive_blind or args.check):
         raise UsageError(blind, where="push run", do="Use the real ones, an emulated base, or --drive-blind")
     if args.fast and not devices_at(rig, "sim"):
-        raise UsageError("--fast is for level sim only: real drivers run on the wall clock", where="push run")
+        raise UsageError(
+            "--fast is for level sim only: real drivers run on the wall clock",
+            where="push run",
+            do="Leave --fast out, or give a rig of level sim",
+        )
     check_room(rig, args.seed)
     if args.trials and not (args.dry_run or args.check):
         check_trials(args, rig)

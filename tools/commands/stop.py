@@ -34,7 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "rig", nargs="?", type=name_or_path, help="only runs of this rig or with its devices: a name or a path (all)"
     )
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one value, repeatable")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change one value of the rig, repeatable"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
 
 

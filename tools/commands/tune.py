@@ -216,6 +216,7 @@ def _print_result(result: dict[str, Any], asked_k_f: float, slide_force_N: float
         f"what it costs: {result['offset_m_per_degree']:.2g} m of steady offset for each degree of error in the "
         f"force's direction, {result['offset_m_per_newton']:.2g} m for each newton of bias at {slide_force_N:g} N"
     )
+    tell("k_y as a share of its limit (1 is the edge of stability):")
     for preset in result["presets"]:
         shares = preset["share_of_limit"], preset["share_of_pessimistic_limit"]
         judged, low = ("none is stable" if share is None else f"{share:.2f}" for share in shares)

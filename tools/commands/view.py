@@ -60,5 +60,7 @@ def write_layouts(folder: Path) -> Layouts:
         write_atomically(layouts.lichtblick, (json.dumps(lichtblick.layout(), indent=2) + "\n").encode())
         write_atomically(layouts.rerun, _BLUEPRINT.read_bytes())
     except OSError as error:
-        raise EnvironmentFault(f"the layouts cannot be written: {error.strerror}", where=str(folder)) from None
+        raise EnvironmentFault(
+            f"the layouts cannot be written: {error.strerror}", where=str(folder), do="Give another --out"
+        ) from None
     return layouts

@@ -39,12 +39,12 @@ it should. Beyond the rows of the table these are proved:
 ## Faults on demand
 
     push run sim --fast --fault "ft.frozen at 10 s for 1 s"
-    push run emulated --fault "base.pose.turned=20 at 0 s" --fault "arm.off at 12 s"
+    push run emulated --fault "base.pose.turned=5 at 0 s" --fault "arm.off at 12 s"
 
 `--fault "DEVICE.KIND[=VALUE] at T s [for T s]"` changes what a device gives, or what the base obeys, at the driver's
 edge, before control and gate see it; T counts from the first tick. In a rig file the same words are a list:
 `[faults]`, `inject = ["ft.off at 10 s"]`. It works at the levels sim and emulated, and is refused where any device is
-real. The log notes each fault, and replays as any other; `summary.json` counts under `injected` how many samples each
+real. The log notes each fault, and replays like any other; `summary.json` counts under `injected` how many samples each
 fault has changed. A fault that changed nothing is an error (exit code 2).
 """
 
@@ -78,11 +78,12 @@ def _kinds() -> str:
 def _entry(fault: Fault, settings: SafetySettings) -> str:
     limit = limit_of(fault, settings)
     measured = f"{fault.measured}, {fault.unit}" if fault.unit else fault.measured
+    ticks = "tick" if fault.bound_ticks == 1 else "ticks"
     facts = [
         ("Measured", measured),
         ("Limit", "" if limit is None else f"{limit:g} {fault.unit}".strip()),
         ("Reaction", f"{_reaction(fault)}, clears {_clears(fault)}"),
-        ("Bound", f"{fault.bound_ticks} ticks" if fault.mode > Mode.SILENT else ""),
+        ("Bound", f"{fault.bound_ticks} {ticks}" if fault.mode > Mode.SILENT else ""),
         ("Exit code", str(fault.exit_code) if fault.mode >= Mode.HOLD else ""),
         ("Likely causes", fault.cause),
         ("Next step", fault.next_step),

@@ -28,7 +28,11 @@ def check_live(port: int, *, fast: bool = False) -> None:
     fast: the run does not keep to the wall clock, which is UsageError.
     """
     if fast:
-        raise UsageError("--live shows a run at the pace of the clock, and --fast does not keep it", where="push run")
+        raise UsageError(
+            "--live shows a run at the pace of the clock, and --fast does not keep it",
+            where="push run",
+            do="Leave --fast out",
+        )
     if importlib.util.find_spec("foxglove") is None:
         raise EnvironmentFault("--live needs foxglove-sdk, which is not installed", do=EXTRA)
     with socket.socket() as probe:

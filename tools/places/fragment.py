@@ -72,7 +72,9 @@ def write_fragment(path: Path, fragment: Fragment) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_new(path, content)
     except OSError as error:
-        raise EnvironmentFault(f"the calibration cannot be written: {error.strerror}", where=str(path)) from None
+        raise EnvironmentFault(
+            f"the calibration cannot be written: {error.strerror}", where=str(path), do="Give another --out"
+        ) from None
 
 
 def _check(text: str, name: str) -> None:

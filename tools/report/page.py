@@ -77,7 +77,9 @@ def write_report(log: Path, out_html: Path, *, png: bool = False, grown: Grown |
             for picture in pictures:
                 write_atomically(picture, as_png(drawn[picture.stem]))
         except OSError as error:
-            raise EnvironmentFault(f"the report cannot be written: {error.strerror}", where=str(out_html)) from None
+            raise EnvironmentFault(
+                f"the report cannot be written: {error.strerror}", where=str(out_html), do="Give another --out"
+            ) from None
     return [out_html, *pictures]
 
 

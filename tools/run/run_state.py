@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from control.sequence import FRESH_NS
 from robot_io.tick import ControlState, Mode, Phase, TickInput, TickOutput, TickState
 from tools.places.saved_tare import SavedTare
@@ -16,7 +18,7 @@ def initial_state(saved: SavedTare | None) -> TickState:
 
 
 def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[str, object]:
-    """Return the figures of the live line."""
+    """Return the figures of the live line; the speed (m/s) is that of the command after the envelope."""
     control = state.control
     return {
         "tick": inp.tick,
@@ -28,7 +30,7 @@ def status_line(inp: TickInput, state: TickState, output: TickOutput) -> dict[st
         "lateral_m": round(control.lateral_m, 4),
         "force_N": [round(value, 2) for value in control.force_world],
         "theta_p": round(control.theta_p, 4),
-        "speed": round(control.speed, 4),
+        "speed": round(math.hypot(output.command_body.vx, output.command_body.vy), 4),
         "faults": list(output.faults),
         "fault_values": list(output.fault_values),
         "first_fault": state.safety.first_fault,

@@ -97,7 +97,7 @@ def find_study(name_or_path: str) -> Path:
     if path.is_file():
         return path
     if path.suffix == ".toml" or "/" in name_or_path:
-        raise ConfigError("there is no such study file", where=name_or_path)
+        raise ConfigError("there is no such study file", where=name_or_path, do="Check the name")
     near = difflib.get_close_matches(name_or_path, shipped, n=1)
     hint = f"Did you mean `{near[0]}`? " if near else ""
     raise ConfigError(

@@ -101,7 +101,8 @@ def load_grid(path: Path, changes: Mapping[str, Any], dt_s: float | None = None)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"this grid cannot be read: {error}", where=name, do="Give `paper` or a TOML file") from None
+        why = error.strerror if isinstance(error, OSError) else error
+        raise ConfigError(f"this grid cannot be read: {why}", where=name, do="Give `paper` or a TOML file") from None
     data, origins = toml_text.parse(text, name)
     _use_todays_names(data, origins, name)
     for word in (changes.get("law"), *_laws(data)):

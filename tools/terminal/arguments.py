@@ -9,10 +9,12 @@ from pathlib import Path
 
 
 def name_or_path(text: str) -> str:
-    """Return a name as it is, and a path with `~` replaced. Raises ArgumentTypeError for the home of nobody.
+    """Return a name as it is, and a path with `~` replaced. Raises ArgumentTypeError for "" and for the home of nobody.
 
-    The shell leaves the sign in `--out=~/x`, and within quotes.
+    The shell leaves the sign in `--out=~/x`, and within quotes; of a variable that is not set it leaves nothing.
     """
+    if not text:
+        raise ArgumentTypeError("an empty name is no file or folder; the current folder is `.`")
     if not text.startswith("~"):
         return text
     try:
@@ -23,7 +25,7 @@ def name_or_path(text: str) -> str:
 
 
 def named_path(text: str) -> Path:
-    """Return a path with `~` replaced. Raises ArgumentTypeError for the home of nobody."""
+    """Return a path with `~` replaced. Raises ArgumentTypeError as `name_or_path`."""
     return Path(name_or_path(text))
 
 
@@ -74,7 +76,8 @@ def pair(low: float, high: float, names: str, *, rising: bool = False) -> Callab
             or not all(low <= value <= high for value in values)
             or (rising and values != sorted(values))
         ):
-            raise ArgumentTypeError(f"`{text}` is not {names} with both from {low:g} to {high:g}")
+            order = ", the lower first" if rising else ""
+            raise ArgumentTypeError(f"`{text}` is not {names} with both from {low:g} to {high:g}{order}")
         return values[0], values[1]
 
     return read

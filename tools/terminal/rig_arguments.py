@@ -12,7 +12,14 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "rig", nargs="?", type=name_or_path, default="emulated", help="a shipped rig or a TOML file (default: emulated)"
     )
-    parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="one setting")
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change one value of the rig, repeatable",
+    )
 
 
 def add_faults(parser: argparse.ArgumentParser, words: str) -> None:

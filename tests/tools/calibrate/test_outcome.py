@@ -69,6 +69,26 @@ def test_readings_never_replace_another_file(tmp_path, rig):
     assert lines(found(), written, None)[0] == "contact: +1.0000 m +- 0.0012 (k = 2)"
 
 
+@pytest.mark.parametrize(
+    ("what", "names"),
+    [
+        ("bias", "fx, fy, fz, mx, my, mz of the sensor"),
+        ("contact", "ahead, left"),
+        ("marker", "ahead, left, turned to the left"),
+        ("path", "x, y, direction"),
+    ],
+)
+def test_several_values_are_named(what, names, tmp_path, rig):
+    value = (1.0,) * len(names.replace("turned to the left", "turned").split(", "))
+    told = lines(found(what, value=value), saved(found(), rig, None, tmp_path / "a.toml", None), None)
+    assert told[len(value)] == f"in this order: {names}"
+
+
+def test_one_value_needs_no_name(tmp_path, rig):
+    told = lines(found("frame", value=(1.0,)), saved(found(), rig, None, tmp_path / "a.toml", None), None)
+    assert told[1] == "by by hand"
+
+
 def test_nothing_read_leaves_no_file_of_readings(tmp_path, rig):
     assert saved(found(), rig, Raw(), tmp_path / "a.toml", None).readings is None
     assert [path.name for path in tmp_path.iterdir()] == ["a.toml"]

@@ -159,6 +159,19 @@ def test_a_truncated_log_is_exit_8_with_the_command_that_helps_and_the_command_h
     assert main(["log", "recover", str(log), "--out", str(tmp_path / "new.mcap")]) == 2
 
 
+@pytest.mark.parametrize("bytes_left", [8, 20, 60])
+def test_recover_does_not_advise_itself_where_nothing_is_left(log, tmp_path, capsys, bytes_left):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(log.read_bytes()[:bytes_left])
+    assert main(["log", "recover", str(cut), "--json"]) == 8
+    error = last_json(capsys)["error"]
+    assert "no message can be saved" in error["what"]
+    assert "the log is truncated" in error["what"]
+    assert "log recover" not in error["do"]
+    assert "copy" in error["do"]
+    assert [path.name for path in tmp_path.glob("cut*")] == ["cut.mcap"]
+
+
 def test_a_flipped_bit_is_exit_8(log, tmp_path, capsys):
     raw = bytearray(log.read_bytes())
     raw[len(raw) // 3] ^= 1

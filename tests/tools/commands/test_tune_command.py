@@ -32,6 +32,7 @@ def test_a_recommendation_with_its_margin_costs_and_map(tmp_path, capsys):
     assert result["offset_m_per_degree"] == pytest.approx(1.3 / 0.32 * 0.0174533, rel=1e-5)
     assert result["offset_m_per_newton"] == pytest.approx(1.3 / 0.32 / 15)
     assert "the pessimistic limit is 0.544 rad/m" in err
+    assert "k_y as a share of its limit (1 is the edge of stability):" in err
     assert result["checks_passed"] is None
     for name in result["files"]:
         assert (tmp_path / "out" / name).stat().st_size > 5000

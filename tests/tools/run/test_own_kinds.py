@@ -110,7 +110,9 @@ class Weak(Whole):
     [
         ("robotic-ft300", "Did you mean `robotiq-ft300`?"),
         ("absent_module:Sensor", "cannot be imported: ModuleNotFoundError"),
+        ("absent_module:Sensor", "Put its folder on PYTHONPATH"),
         ("kinds:Absent", "cannot be imported: AttributeError"),
+        ("kinds:Absent", "Correct the module, or the name of its class"),
         ("kinds:SensorFacts", "lacks `from_rig`, `open`"),
         ("broken:Sensor", "cannot be imported: SyntaxError"),
         ("raising:Sensor", "cannot be imported: ZeroDivisionError"),

@@ -36,7 +36,9 @@ def folder_for(out: Path | None) -> Path:
             )
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EnvironmentFault(f"this folder cannot be written: {error.strerror}", where=str(folder)) from None
+        raise EnvironmentFault(
+            f"this folder cannot be written: {error.strerror}", where=str(folder), do="Give another --out"
+        ) from None
     return folder
 
 
@@ -59,7 +61,9 @@ def write_comparison(runs: Sequence[ComparedRun], folder: Path, *, as_png: bool 
         for name, data in content.items():
             write_atomically(folder / name, data)
     except OSError as error:
-        raise EnvironmentFault(f"the comparison cannot be written: {error.strerror}", where=str(folder)) from None
+        raise EnvironmentFault(
+            f"the comparison cannot be written: {error.strerror}", where=str(folder), do="Give another --out"
+        ) from None
     return [folder / name for name in content]
 
 

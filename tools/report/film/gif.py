@@ -32,7 +32,9 @@ def write_gif(runs: Sequence[ComparedRun], out: Path) -> None:
     try:
         write_atomically(out, data)
     except OSError as error:
-        raise EnvironmentFault(f"the film cannot be written: {error.strerror}", where=str(out)) from None
+        raise EnvironmentFault(
+            f"the film cannot be written: {error.strerror}", where=str(out), do="Give another --out"
+        ) from None
 
 
 def _encoded(frames: Sequence[Any], per_frame_ms: float) -> bytes:

@@ -41,7 +41,9 @@ def write_mp4(runs: Sequence[ComparedRun], out: Path) -> None:
             raise EnvironmentFault(f"ffmpeg could not write the film: {why}", where=str(out), do="Use --gif")
         part.replace(out)
     except OSError as error:
-        raise EnvironmentFault(f"the film cannot be written: {error.strerror}", where=str(out)) from None
+        raise EnvironmentFault(
+            f"the film cannot be written: {error.strerror}", where=str(out), do="Give another --out"
+        ) from None
     finally:
         part.unlink(missing_ok=True)
 
