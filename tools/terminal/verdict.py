@@ -111,7 +111,7 @@ def _where(summary: dict[str, Any]) -> str:
     pusher = f"{summary['lateral_error_m']:+.3f} m"
     if summary["object_lateral_error_m"] is None:
         return pusher
-    turned = math.degrees(summary["object_turned_rad"])
+    turned = round(math.degrees(summary["object_turned_rad"]), 0) + 0.0  # no -0
     return f"{pusher} (the object: {summary['object_lateral_error_m']:+.3f} m, turned {turned:+.0f} degrees)"
 
 
