@@ -16,7 +16,7 @@ LINGER_S = 11.0
 """ROS keeps a client of the bridge as publisher for 10 s after it has gone."""
 ASK_AGAIN_S = 1.0
 LISTEN_LEAST_S = 1.5
-"""Of a feed that pauses 0.2 s in every 0.4 s, two whole pauses are in it, whenever it begins (in 1 s: one, at times)."""
+"""Of a feed that pauses 0.2 s in every 0.4 s this holds two whole pauses, wherever it begins; 1 s may hold one."""
 CLOCK_S = 0.1
 """Clocks further apart make stamps of the robot and of this machine hard to compare; nothing in a run compares them."""
 ROSAPI_FIX = "Start rosapi beside rosbridge: without it names and types are not checked"
