@@ -81,7 +81,7 @@ def read(cdr_type: CdrType[Message], payload: bytes) -> Message | str:
 def test_what_was_read_before_changes_nothing(lists):
     rng = random.Random(lists)
     writer, known = fresh(), fresh()
-    for _ in range(600):
+    for _ in range(150):
         payload = writer.encode(message(rng, lists=lists))
         assert read(known, payload) == read(fresh(), payload) == writer.decode(payload)
 
@@ -89,7 +89,7 @@ def test_what_was_read_before_changes_nothing(lists):
 def test_a_spoilt_message_is_refused_in_the_same_words_or_read_as_the_same():
     rng = random.Random(7)
     refused = 0
-    for _ in range(40):
+    for _ in range(12):
         known = fresh()
         payload = known.encode(message(rng))
         for _ in range(3):
@@ -101,7 +101,7 @@ def test_a_spoilt_message_is_refused_in_the_same_words_or_read_as_the_same():
             found = read(known, bytes(spoilt))
             assert found == read(fresh(), bytes(spoilt))
             refused += isinstance(found, str)
-    assert 200 < refused < 900
+    assert 60 < refused < 270
 
 
 def test_other_counts_in_as_many_bytes_are_read_as_they_are():
