@@ -101,7 +101,7 @@ def test_a_spoilt_message_is_refused_in_the_same_words_or_read_as_the_same():
             found = read(known, bytes(spoilt))
             assert found == read(fresh(), bytes(spoilt))
             refused += isinstance(found, str)
-    assert 60 < refused < 270
+    assert 60 < refused < 295  # of 300: both happen
 
 
 def test_other_counts_in_as_many_bytes_are_read_as_they_are():
