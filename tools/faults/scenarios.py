@@ -82,6 +82,8 @@ def two_cm_on(inp: TickInput, state: TickState) -> bool:
     return state.control.phase >= Phase.APPROACH and _contact_x(inp) - state.control.approach_from_m > 0.02
 
 
+SIDEWAYS_TICKS = 299
+"""Of 0.3 m at 0.1 m/s, after the one in which it begins."""
 LOST_TICKS = 300
 """Contact may stay lost for 3 s (F52)."""
 
@@ -198,7 +200,13 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("F55-slow", "drifts aside", ("base.odometry.wrong=0,0.04",), edge_beside_m=0.018, settings=CALM),
     Scenario("F55-stop", "drifts aside", ("base.odometry.wrong=0,0.08",), edge_beside_m=0.018, settings=CALM),
     Scenario("F56", "it pulls", alter=do.pushed_aside(110.0, 15.0), begins=backward),
-    Scenario("F56-way", "it pushes from the side", alter=do.pushed_aside(75.0, 15.0), begins=sideways),
+    Scenario(
+        "F56-way",
+        "it pushes from the side",
+        alter=do.pushed_aside(75.0, 15.0),
+        begins=sideways,
+        evidence_ticks=SIDEWAYS_TICKS,
+    ),
     Scenario("F57", "the law raises an exception", core=steered_by(Raising())),
     Scenario("F57", "its state is of another type", core=steered_by(Forgetful())),
     Scenario("F57-slow", "a step takes 2 ms", alter=do.host(law_ns=2_000_000)),
