@@ -34,6 +34,8 @@ class AssumedSlider(msgspec.Struct, frozen=True):
         is_round = isinstance(self.outline, Circle)
         rho = self.outline.radius_m if isinstance(self.outline, Circle) else max(x for x, _ in self.outline.corners)
         shift, grain = self.effects.shift_m, self.effects.along_over_across
+        if self.effects.turning != "ellipsoid":
+            d /= grain  # turning moves points across the push, where a small motion meets 1 / grain^2 of the friction
         return PushedBody(is_round, rho, d, self.ball_radius_m, shift, grain)
 
     def pushed(self, turning: Turning, contact_friction: float) -> PushedSlider:

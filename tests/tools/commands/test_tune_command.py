@@ -59,7 +59,8 @@ def test_one_slider_gives_its_own_limit(tmp_path, capsys):
         capsys, "--out", tmp_path / "out", "--no-check", "--shapes", "circle", "--size-m", "0.5,0.5",
         "--pressures", "rim", "--floor-friction", "0.3", "--anisotropy", "1.05", *HEIGHT,
     )  # fmt: skip
-    body = PushedBody(True, 0.25, (0.25**2 / 2 - 0.045**2) ** 0.5, 0.05, 0.045, 1.05)
+    # A rim's mean square distance less the lean, and 1 / 1.05 of it: across, friction is less by 1.05^2.
+    body = PushedBody(True, 0.25, (0.25**2 / 2 - 0.045**2) ** 0.5 / 1.05, 0.05, 0.045, 1.05)
     assert result["assumed"] == 1
     assert result["limit_k_y_rad_per_m"] == pytest.approx(limit([body], 0.3))
     at = {entry["k_f"]: entry["k_y_rad_per_m"] for entry in result["limits"]}
