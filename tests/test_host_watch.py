@@ -1,5 +1,6 @@
 """What becomes of a test that this machine keeps from measuring."""
 
+import contextlib
 import signal
 from pathlib import Path
 
@@ -78,6 +79,20 @@ def struck(monkeypatch, zero_ms, rest_ms, stall_ms=50.0):
 def test_a_round_within_its_bounds_is_measured_however_the_host_did(monkeypatch, unmeasured):
     struck(monkeypatch, 20.0, 80.0)
     assert unmeasured.take() == []
+
+
+@pytest.mark.parametrize(("measure_all", "rounds"), [(False, 1), (True, 4)])
+def test_a_round_that_the_host_stalled_is_repeated_where_everything_is_measured(
+    monkeypatch, unmeasured, measure_all, rounds
+):
+    unmeasured.fails = measure_all
+    struck_at = []
+    found = Round(None, Path(), 99.0, 140.0, 50.0, 500.0, 500.0, 0)
+    monkeypatch.setattr("tests.faults.kill_rounds.strike", lambda *words: struck_at.append(words) or found)
+    failed = pytest.raises(AssertionError, match="not measured") if measure_all else contextlib.nullcontext()
+    with failed:
+        within(Path(), Path(), "gate", signal.SIGKILL, None, zero_ms=20.0, rest_ms=60.0)
+    assert len(struck_at) == rounds
 
 
 def test_bounds_that_no_round_could_measure_are_reported_and_the_order_is_judged(monkeypatch, unmeasured):

@@ -65,26 +65,32 @@ class KnownForm:
 
 
 class KnownForms:
-    """Keeps the form of a message that has come twice with the same length, at the same place."""
+    """Keeps the forms of messages that have come twice with the same length, at the same place.
+
+    Those of one length may take turns: `/base/odom` and `/world/base` differ in the lengths of two names.
+    """
 
     MOST = 1000
-    """More than a run's messages have; beyond it those kept are made anew."""
+    """More lengths than a run's messages have; beyond it those kept are made anew."""
+    MOST_OF_A_LENGTH = 4
+    """What has more forms than these is read part by part: making one costs as much as ten such readings."""
 
     def __init__(self) -> None:
-        self._forms: dict[tuple[int, int], KnownForm | None] = {}
-        self._once: set[tuple[int, int]] = set()
+        self._forms: dict[tuple[int, int], list[KnownForm | None]] = {}
 
-    def at(self, payload: bytes, at: int) -> KnownForm | None:
-        """Return the form of a message that begins at `at`, None where none is known."""
-        return self._forms.get((at, len(payload)))
+    def read(self, payload: bytes, at: int) -> tuple[list[Any], int] | None:
+        """Return the values of a message that begins at `at` and where they end; None where its form is not known."""
+        for form in self._forms.get((at, len(payload)), ()):
+            if form is not None and (found := form.read(payload, at)) is not None:
+                return found
+        return None
 
     def note(self, payload: bytes, at: int, form: Callable[[], KnownForm | None]) -> None:
         """Take note of a message that was read part by part; `form` makes its form, None if it can have none."""
         key = (at, len(payload))
-        if key not in self._once:
-            if len(self._once) >= self.MOST:
-                self._once.clear()
+        if (known := self._forms.get(key)) is None:
+            if len(self._forms) >= self.MOST:
                 self._forms.clear()
-            self._once.add(key)
-        else:
-            self._forms[key] = form()
+            self._forms[key] = []
+        elif len(known) < self.MOST_OF_A_LENGTH:
+            known.append(form())

@@ -61,8 +61,7 @@ class Layout:
         """Return the Struct found at `at` and where it ends. Raises NotThisType, struct.error or ValueError."""
         if self._build is None:
             self._build = builder(self._shape)
-        known = self._forms.at(payload, at)
-        if known is not None and (read := known.read(payload, at)) is not None:
+        if (read := self._forms.read(payload, at)) is not None:
             return self._build(read[0]), read[1]
         found: list[Any] = []
         end = at
@@ -176,6 +175,7 @@ class _Rows(_Items):
         super().__init__(path, element, None)
         self._element = element
         self._columns = columns
+        self._row: Build | None = None
 
     def writing(self) -> Sequence:
         return Sequence(self._path, flattener_of([(path, count) for path, _, count in self._columns]))
@@ -186,7 +186,9 @@ class _Rows(_Items):
     def known(self, found: Iterator[Any]) -> KnownPart:
         rows = len(next(found))
         width = sum(count or 1 for _, _, count in self._columns)
-        build = builder(self._element)
+        if self._row is None:
+            self._row = builder(self._element)
+        build = self._row
 
         def take(values: Values) -> tuple[Any, ...]:
             return tuple([build(list(values[at : at + width])) for at in range(0, len(values), width)])

@@ -113,7 +113,8 @@ def within(
     """Strike until a round keeps its bounds; only one that the host stalled is repeated, three times at most.
 
     Where the host stalled each of them, the bounds are reported as unmeasured, and the last round is judged by its
-    order: a zero where one can come, and wheels at rest after it.
+    order: a zero where one can come, and wheels at rest after it. Without `--measure-all` the first round that came
+    to its blow is the last one: beside another worker of `make test` most rounds are held back.
 
     zero_ms: the zero command's bound (None: none can come). rest_ms: the wheels' bound after it, or after the
     signal where no command comes.
@@ -133,6 +134,8 @@ def within(
         assert found.stall_ms > STALL_MS, f"{told}; bounds: {_ms(zero_ms)}, then {_ms(rest_ms)}"
         print("  repeated: the host stalled")
         last = found
+        if not UNMEASURED.fails:
+            break
     UNMEASURED.add(f"{number.name} of {name}: zero within {_ms(zero_ms)}, rest within {_ms(rest_ms)}")
     if last is None:
         pytest.skip(f"unmeasured: the host stalled each of {1 + REPEATS} pushes before the blow")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -106,9 +108,14 @@ def test_a_tolerance_that_is_none_is_usage(value, sim_log, capsys):
     assert (code, told["error"]["code"]) == (2, 2)
 
 
-def test_differences_are_by_bits_or_by_tolerance():
+class Holds(msgspec.Struct):
+    value: Any
+
+
+@pytest.mark.parametrize("holds", [lambda value: (value,), Holds, lambda value: Holds((Holds(value), 1.0))])
+def test_differences_are_by_bits_or_by_tolerance(holds):
     def differ(old: object, new: object, tolerance: float | None = None) -> bool:
-        return difference(0, (old,), (new,), tolerance) is not None
+        return difference(0, holds(old), holds(new), tolerance) is not None
 
     assert not differ(math.nan, math.nan)
     assert differ(math.nan, -math.nan)

@@ -25,9 +25,10 @@ def ends_with_stop(node: ast.expr) -> bool:
 def full_stops(source: str) -> list[int]:
     """Return the lines of the parts of errors that end with one."""
     found = []
+    types = error_types()
     for call in ast.walk(ast.parse(source)):
         if isinstance(call, ast.Call):
-            made = isinstance(call.func, ast.Name) and call.func.id in error_types()
+            made = isinstance(call.func, ast.Name) and call.func.id in types
             parts = call.args if made else []
             parts += [word.value for word in call.keywords if word.arg in ("do", "where")]
             found += [part.lineno for part in parts if ends_with_stop(part)]

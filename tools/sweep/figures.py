@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+DOTS_PER_INCH = 150
 SAMPLE_SECONDS = 120.0
 """Part of a sample's ten minutes that is drawn."""
 OUTLINE_EVERY_S = 15.0
@@ -29,7 +30,7 @@ def save(figure: Figure, out: Path, name: str) -> list[str]:
     import matplotlib as mpl
 
     with mpl.rc_context({"svg.hashsalt": name}):
-        figure.savefig(out / f"{name}.png", dpi=150)
+        figure.savefig(out / f"{name}.png", dpi=DOTS_PER_INCH)
         figure.savefig(out / f"{name}.svg", metadata={"Date": None})
     return [f"{name}.png", f"{name}.svg"]
 

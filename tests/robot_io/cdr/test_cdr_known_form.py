@@ -10,6 +10,8 @@ import msgspec
 import pytest
 
 from robot_io.cdr.cdr_type import CdrType
+from robot_io.cdr.known_form import KnownForm
+from robot_io.cdr.parts import Layout
 from robot_io.errors import LogDamaged
 
 
@@ -111,6 +113,35 @@ def test_other_counts_in_as_many_bytes_are_read_as_they_are():
         for shorts, switches in (((1, 2), (True,) * 4), ((3,), (False,) * 6), ((), (True,) * 8)):
             value = Message(True, (), "", shorts, switches, Part(1, ()), (), (), (), 2)
             assert cdr_type.decode(cdr_type.encode(value)) == value
+
+
+def test_a_form_is_made_once_and_those_of_one_length_may_take_turns(monkeypatch):
+    made = []
+    monkeypatch.setattr("robot_io.cdr.parts.KnownForm", lambda *parts: made.append(parts) or KnownForm(*parts))
+    cdr_type = fresh()
+    turns = [
+        cdr_type.encode(Message(True, (), "", shorts, switches, Part(1, ()), (), (), (), 2))
+        for shorts, switches in (((1, 2), (True,) * 4), ((3,), (False,) * 6), ((), (True,) * 8))
+    ]
+    assert len({len(payload) for payload in turns}) == 1
+    for _ in range(9):
+        for payload in turns:
+            cdr_type.decode(payload)
+    assert len(made) == 3
+
+
+def test_of_one_length_only_a_few_forms_are_made_and_none_twice_that_cannot_be(monkeypatch):
+    tries = []
+    form = Layout._form
+    monkeypatch.setattr(Layout, "_form", lambda *args: tries.append(args) or form(*args))
+    cdr_type = fresh()
+    without = [Message(True, (), "", (), (True,) * n, Part(1, ()), ("ab",), (), (), 2) for n in (0, 1, 2, 3, 4)]
+    for _ in range(9):
+        for value in without:
+            payload = cdr_type.encode(value)
+            assert cdr_type.decode(payload) == value
+    lengths = {len(cdr_type.encode(value)) for value in without}
+    assert len(tries) <= 4 * len(lengths)
 
 
 def test_a_string_that_lost_its_end_is_refused_by_a_type_that_knows_its_length():

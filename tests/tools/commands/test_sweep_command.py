@@ -43,6 +43,12 @@ record_s = 2
 RESULTS = ("results.csv", "states.npz", "summary.json", "trajectories.png", "trajectories.svg")
 
 
+@pytest.fixture(autouse=True)
+def figures_at_low_resolution(monkeypatch):
+    """Most of a small study is the drawing of its figures, and most of that the number of their dots."""
+    monkeypatch.setattr("tools.sweep.figures.DOTS_PER_INCH", 20)
+
+
 @pytest.fixture
 def grid(tmp_path):
     path = tmp_path / "small.toml"
