@@ -18,7 +18,10 @@ demo: runtime ## set up, push a box 2 m with the real drivers over wire emulator
 	$(BIN)/push run emulated --distance-m 2 --out $(DEMO)
 	$(BIN)/push replay $(DEMO)/run.mcap
 
-test: check ## set up, check style, types and import rules, run all tests but the long ones
+test: dev ## set up, check style, types and import rules, run all tests but the long ones
+	@# The tests are compiled while mypy runs: otherwise both workers do it, each for itself.
+	@$(BIN)/python -m pytest -q --collect-only >/dev/null 2>&1 & compiling=$$!; \
+	$(MAKE) --no-print-directory check; found=$$?; wait $$compiling; exit $$found
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 test-all: check ## the same with the long tests

@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
@@ -88,6 +89,7 @@ class Nested:
 Shape = Scalar | Text | Blob | Many | Nested
 
 
+@cache
 def shape_of(annotation: Any) -> Shape:
     """Return the shape of a type annotation. Raises TypeError for what ROS 2 cannot carry."""
     if get_origin(annotation) is Annotated:
