@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import socket
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from robot_io.error_report import ignoring_output_errors, say_json, tell
-from robot_io.errors import EnvironmentFault, PushError, UsageError
+from robot_io.errors import EnvironmentFault, UsageError
 from robot_io.ipc.process import allow_descriptors
 from robot_io.rig.config import RigConfig
 from tools.commands.run_laws import add_law_arguments, check_law, law_overrides, note_passed_law
@@ -37,6 +36,11 @@ from tools.terminal.rig_arguments import add_faults, add_rig
 from tools.verdict.arm_pose import arm_pose_notes
 from tools.verdict.object_pose import object_pose
 from tools.verdict.witness import Witness
+
+if TYPE_CHECKING:
+    from tools.log.run_parts import RunParts
+    from tools.run.launcher import Launcher
+    from tools.run.lockstep import Lockstep
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,10 +114,14 @@ def push_once(
     simulated = bool(devices_at(rig, "sim"))
     out = run_dir.create(out, rig.name)
     follow = simulated and not args.no_report and not rig.log.in_parts
-    early = ReportProcess(out / "run.mcap", out / "report.html") if follow else None
+    early, ran = None, False
     try:
+        early = ReportProcess(out / "run.mcap", out / "report.html") if follow else None
+        ran = True  # from here on they know whether the run has begun
         summary = run_lockstep(args, rig, out, saved) if simulated else run_wall_clock(args, rig, out, saved)
     except BaseException:
+        if not ran:
+            run_dir.discard(out)
         if early is not None:
             early.drop()
         raise
@@ -201,13 +209,12 @@ def prepare(args: argparse.Namespace, rig: RigConfig) -> None:
 
 def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
     """Run the processes of a wall-clock run and return its summary."""
-    launcher = None
-    try:
+    launcher: Launcher | None = None
+    with run_dir.discarded_unless(out, lambda: launcher is not None and launcher.began):
         from tools.run.launcher import Launcher
         from tools.run.processes import MOST_DESCRIPTORS
 
         allow_descriptors(MOST_DESCRIPTORS)
-
         launcher = Launcher(
             rig,
             out,
@@ -220,10 +227,6 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
         )
         with awake():
             figures = launcher.run()
-    except BaseException:
-        if launcher is None or not launcher.began:
-            run_dir.discard(out)
-        raise
     save_tare(rig, figures)
     summary = verdict.summary(
         rig,
@@ -243,31 +246,34 @@ def run_wall_clock(args: argparse.Namespace, rig: RigConfig, out: Path, saved: S
 
 
 def run_lockstep(args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None) -> dict[str, Any]:
-    """Run level sim, with its live view where one is wanted, and return its summary."""
-    with live_view(args.live_port if args.live else None) as to_view:
-        return lockstep_summary(args, rig, out, saved, to_view)
+    """Run level sim in this process, with its live view where one is wanted, and return its summary."""
+    one: Lockstep | None = None
+    with (
+        run_dir.discarded_unless(out, lambda: one is not None and one.began),
+        live_view(args.live_port if args.live else None) as to_view,
+    ):
+        from tools.run.lockstep import Lockstep, open_log
+
+        law = own_law(rig.control, folder_of(args.rig))
+        text = run_dir.write_config(out, rig)
+        log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
+        try:
+            one, live = Lockstep(rig, args.seed, log, saved=saved, law=law), LiveLine(rig)
+        except BaseException:  # an impossible world, or an interrupt
+            log.abandon()
+            raise
+        return lockstep_summary(args, one, log, out, live)
 
 
 def lockstep_summary(
-    args: argparse.Namespace, rig: RigConfig, out: Path, saved: SavedTare | None, to_view: socket.socket | None
+    args: argparse.Namespace, one: Lockstep, log: RunParts, out: Path, live: LiveLine
 ) -> dict[str, Any]:
-    """Run level sim in this process and return its summary."""
-    from tools.run.lockstep import Lockstep, open_log
+    """Run to the end and return the summary."""
     from tools.run.paced import PacedRun, run_fast
 
-    law = own_law(rig.control, folder_of(args.rig))
-    text = run_dir.write_config(out, rig)
-    log = open_log(out / "run.mcap", text, args.seed, in_contact=saved is not None, note=args.note, to_view=to_view)
-    try:
-        one = Lockstep(rig, args.seed, log, saved=saved, law=law)
-    except PushError:  # an impossible world: nothing has started
-        log.abandon()
-        run_dir.discard(out)
-        raise
-    live = LiveLine(rig)
     try:
         try:
-            with announced(rig, out / "run.mcap"):
+            with announced(one.rig, out / "run.mcap"):
                 figures = run_fast(one) if args.fast else PacedRun(one, live).run()
         finally:
             live.close()
@@ -277,9 +283,9 @@ def lockstep_summary(
         raise EnvironmentFault(
             f"the log cannot be written any more: {error.strerror}", where=str(out / "run.mcap"), do="Free some space"
         ) from None
-    save_tare(rig, figures)
+    save_tare(one.rig, figures)
     summary = verdict.summary(
-        rig,
+        one.rig,
         figures,
         out=out,
         log=out / "run.mcap",
@@ -287,8 +293,8 @@ def lockstep_summary(
         level="sim",
         note=args.note,
         devices=figures["devices"],
-        notes=arm_pose_notes(rig, figures),
+        notes=arm_pose_notes(one.rig, figures),
         witness=Witness(),
-        pushed=object_pose(rig.path, log.object_poses),
+        pushed=object_pose(one.rig.path, log.object_poses),
     )
     return with_injected(summary, figures["injected"]) | {"latency": msgspec.to_builtins(log.latencies)}

@@ -40,5 +40,7 @@ def write_json(path: Path, value: object) -> None:
 def check_writable(folder: Path) -> None:
     """Raise OSError unless files can be created in a folder: better now than at the end of a run."""
     probe = folder / ".writable"
-    probe.touch()
-    probe.unlink()
+    try:
+        probe.touch()
+    finally:
+        probe.unlink(missing_ok=True)

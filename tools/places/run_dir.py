@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from robot_io.errors import UsageError
@@ -27,7 +28,11 @@ def create(out: Path | None, rig_name: str) -> Path:
         if out and (any((path / name).exists() for name in RUN_FILES) or has_parts(path / LOG)):
             raise UsageError("this folder already holds a run", where=str(path), do="Give another --out")
         path = _make_folder(path, given=bool(out))
-        check_writable(path)
+        try:
+            check_writable(path)
+        except KeyboardInterrupt:
+            discard(path)
+            raise
     except OSError as error:
         raise UsageError(
             f"the run's folder cannot be written: {error.strerror}", where=str(path), do="Give another --out"
@@ -46,6 +51,17 @@ def _make_folder(path: Path, *, given: bool) -> Path:
             numbered.mkdir(parents=True)
             return numbered
     raise FileExistsError(errno.EEXIST, "too many runs at the same time", str(path))
+
+
+@contextlib.contextmanager
+def discarded_unless(path: Path, begun: Callable[[], bool]) -> Iterator[None]:
+    """Discard the folder where this ends in any exception, the operator's interrupt too, unless the run has begun."""
+    try:
+        yield
+    except BaseException:
+        if not begun():
+            discard(path)
+        raise
 
 
 def discard(path: Path) -> None:

@@ -108,6 +108,8 @@ class Lockstep:
         self.notes = RunNotes()
         self.operator = Operator.NONE
         self.paused = False
+        self.began = False
+        """Whether it has come to its first tick."""
 
     def run(self, on_tick: Callable[[TickInput, TickState, TickOutput], None]) -> dict[str, Any]:
         """Run to the end and return the figures; `on_tick` is called after each tick (to pace and to display)."""
@@ -118,6 +120,7 @@ class Lockstep:
         if self._gate_log is not None:
             self._gate_log.clock(START_NS, info.clock)  # the base is the last
         tick = 0
+        self.began = True
         while True:
             now_ns = START_NS + tick * self._period_ns
             self._clock.advance_to(now_ns)
