@@ -20,6 +20,7 @@ from safety.faults import FAULTS
 from tests.faults.kill_rounds import Round, pushing, strike, within
 from tests.forked_push import forked
 from tests.host_watch import repeated_when_the_host_stalls
+from tests.how_many import mostly_long
 from tests.push_runs import PUSH, QUICK, ROOT, messages, one_error, stands, started, world_of
 from tools.report.run_data import read_run
 from tools.report.run_verdict import verdict
@@ -58,7 +59,7 @@ def check_dead_control(found: Round, *faults: str) -> None:
     replays(found.folder)
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+@pytest.mark.parametrize("again", mostly_long(range(AGAIN), 0))
 def test_control_killed(state, tmp_path, host, again):
     found = within(state, tmp_path, "control", KILL, host, zero_ms=ZERO_MS, rest_ms=REST_MS)
     check_dead_control(found, "F65")
@@ -73,7 +74,8 @@ def test_control_killed(state, tmp_path, host, again):
     assert json.loads((found.folder / "summary.json").read_text()) == summary
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+@pytest.mark.long
+@pytest.mark.parametrize("again", range(AGAIN))
 def test_launcher_killed(state, tmp_path, host, again):
     found = within(state, tmp_path, "launcher", KILL, host, zero_ms=ZERO_MS, rest_ms=REST_MS)
     # Its pipe to control breaks a moment before the kernel kills control: where a tick falls in between, control has
@@ -82,7 +84,8 @@ def test_launcher_killed(state, tmp_path, host, again):
     assert found.ended.code == -KILL
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+@pytest.mark.long
+@pytest.mark.parametrize("again", range(AGAIN))
 def test_control_frozen(state, tmp_path, host, again):
     found = within(state, tmp_path, "control", STOP, host, zero_ms=FROZEN_ZERO_MS, rest_ms=REST_MS)
     check_dead_control(found, "F66")
@@ -91,7 +94,7 @@ def test_control_frozen(state, tmp_path, host, again):
     assert FAULTS["F66"].text in found.ended.err
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+@pytest.mark.parametrize("again", mostly_long(range(AGAIN), 0))
 def test_gate_killed_and_the_base_stops_by_its_own_timeout(state, tmp_path, host, again):
     found = within(state, tmp_path, "gate", KILL, host, zero_ms=None, rest_ms=GATE_GONE_REST_MS)
     assert found.zero_ms is None, "nobody else holds the base's connection"
@@ -101,7 +104,8 @@ def test_gate_killed_and_the_base_stops_by_its_own_timeout(state, tmp_path, host
     replays(found.folder)
 
 
-@pytest.mark.parametrize("again", [0, *(pytest.param(n, marks=pytest.mark.long) for n in range(1, AGAIN))])
+@pytest.mark.long
+@pytest.mark.parametrize("again", range(AGAIN))
 def test_arm_killed(state, tmp_path, host, again):
     found = within(state, tmp_path, "arm", KILL, host, zero_ms=ARM_GONE_ZERO_MS, rest_ms=REST_MS)
     assert "F69" in logged_faults(found)

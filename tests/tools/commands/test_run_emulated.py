@@ -159,6 +159,7 @@ def test_a_folder_with_a_run_is_refused(done, state, folder):
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
+@pytest.mark.long
 @repeated_when_the_host_stalls
 def test_in_contact_with_the_tare_of_the_run_before(done, state, tmp_path, host):
     ended = finished(

@@ -80,6 +80,7 @@ def test_a_wider_tolerance_of_the_rig_lets_the_same_push_be_done(tmp_path):
     assert (code, summary["verdict"]) == (0, "done")
 
 
+@pytest.mark.long
 def test_a_lost_object_is_told_where_it_stands_not_where_the_pusher_is(tmp_path):
     code, summary, said = ran(tmp_path, "--distance-m", "6", "--law", "open-loop", "--no-report")
     assert (code, summary["verdict"]) == (6, "contact lost")
