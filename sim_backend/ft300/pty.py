@@ -182,7 +182,6 @@ class PtyPort:
         assert self._watch is not None
         self._take_rest()
         self._loop.remove_fd(self._master)
-        self._watch.flush()
         self._watch.nobody()
         self._await_client()
 

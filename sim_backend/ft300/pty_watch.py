@@ -28,6 +28,7 @@ class PtyWatch:
         self._path = path
         self._holders = 0
         self._let_go = False
+        self._opened_since = False
         self._fd: int = _libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
         if self._fd >= 0 and _libc.inotify_add_watch(self._fd, path.encode(), _CLOSED | _OPENED) < 0:
             self.close()
@@ -38,11 +39,15 @@ class PtyWatch:
 
     def reopened(self) -> bool:
         """Return whether, since the last call, the last who had it open closed it and somebody opened it again."""
-        return self._count(self._take())
+        since, self._opened_since = self._opened_since, False
+        return self._count(self._take()) or since
 
     def nobody(self) -> None:
-        """Start anew: the master has seen that nobody has it open."""
-        self._take()
+        """Discard what a client left unread and start anew: the master has seen that nobody has it open.
+
+        The next one may have opened it since then, and may even have written and closed it: `reopened` tells that.
+        """
+        self._opened_since = self.flush() or any(event & _OPENED for event in self._take())
         self._holders = 0
         self._let_go = False
 
