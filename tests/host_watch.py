@@ -24,6 +24,8 @@ REPEATS = 3
 WATCHER = """
 import ctypes, os, signal, sys, time
 ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)
+if os.getppid() != int(sys.argv[3]):
+    sys.exit()
 os.sched_setaffinity(0, {int(sys.argv[1])})
 if sys.argv[2] == "realtime":
     try:
@@ -76,7 +78,9 @@ class HostWatch:
             with open(file.name, "ab") as out:  # noqa: PTH123 - appending, as every watcher does
                 self._watchers += [
                     subprocess.Popen(
-                        [sys.executable, "-c", WATCHER, str(cpu), kind], stdin=subprocess.DEVNULL, stdout=out
+                        [sys.executable, "-c", WATCHER, str(cpu), kind, str(os.getpid())],
+                        stdin=subprocess.DEVNULL,
+                        stdout=out,
                     )
                     for cpu in sorted(os.sched_getaffinity(0))
                 ]

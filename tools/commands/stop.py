@@ -54,7 +54,8 @@ def run(args: argparse.Namespace) -> int:
         zeros = True
     elif not runs:
         tell("no run is under way")
-    tell("at rest")
+    if runs or zeros:
+        tell("at rest")
     if args.json:
         say_json({"schema": SCHEMA, "stopped": [found.rig for found in runs], "zeros_sent": zeros, "at_rest": True})
     return 0

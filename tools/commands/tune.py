@@ -8,9 +8,10 @@ sliders that bind it are checked by simulation.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -98,14 +99,15 @@ def run(args: argparse.Namespace) -> int:
         )
     k_y = _rounded_down(SHARE * highest)
     out = _folder(args.out)
-    from tools.sweep.limit_checks import check_integral_limits, check_limits
+    with _removed_if_left_empty(out):
+        from tools.sweep.limit_checks import check_integral_limits, check_limits
 
-    checks = [] if args.no_check else check_limits(sliders, k_f)
-    integral = _integral(judged, k_f, k_y) if args.law == "force-integral" else None
-    if integral and not args.no_check:
-        checks += check_integral_limits(sliders, k_f, k_y)
+        checks = [] if args.no_check else check_limits(sliders, k_f)
+        integral = _integral(judged, k_f, k_y) if args.law == "force-integral" else None
+        if integral and not args.no_check:
+            checks += check_integral_limits(sliders, k_f, k_y)
+        files = _draw(judged, pessimistic, (k_f, k_y), f"{len(sliders)} sliders of {rig.name}", out)
     gains = {f"rig {rig.name}": (rig.control.k_f, rig.control.k_y_rad_per_m), **PRESETS}
-    files = _draw(judged, pessimistic, (k_f, k_y), f"{len(sliders)} sliders of {rig.name}", out)
     result: dict[str, Any] = {
         "law": args.law,
         "rig": rig.name,
@@ -259,6 +261,15 @@ def _folder(out: Path | None) -> Path:
             f"this folder cannot be written: {error.strerror}", where=str(folder), do="Give another --out"
         ) from None
     return folder
+
+
+@contextlib.contextmanager
+def _removed_if_left_empty(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # there is something in it, as there should be
+            folder.rmdir()
 
 
 def _choices(text: str, known: tuple[Choice, ...], where: str) -> list[Choice]:

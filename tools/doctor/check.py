@@ -125,7 +125,8 @@ def lines(checks: Iterable[Check]) -> list[str]:
 def summary_line(checks: Sequence[Check]) -> str:
     """Return how many checks ended how."""
     counts = {result: sum(check.result == result for check in checks) for result in RESULTS}
-    return ", ".join(f"{count} {result}" for result, count in counts.items() if count)
+    words = {**{result: result for result in RESULTS}, "warning": "warning" if counts["warning"] == 1 else "warnings"}
+    return ", ".join(f"{count} {words[result]}" for result, count in counts.items() if count)
 
 
 def _row(check: Check) -> dict[str, Any]:

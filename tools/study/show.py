@@ -77,7 +77,7 @@ def summed(runs: Runs, keys: list[str]) -> list[dict[str, Any]]:
 
 
 def _cm(spread: dict[str, float] | None, key: str) -> float | None:
-    return None if spread is None else round(100 * spread[key], 1)
+    return None if spread is None else round(100 * spread[key], 1) + 0.0  # no "-0.0"
 
 
 def _head(name: str) -> str:

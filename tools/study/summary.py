@@ -115,7 +115,7 @@ def _sentence(name: str, found: dict[str, Any]) -> str:
 
 
 def _cm(metres: float) -> str:
-    return f"{metres * 100:.1f} cm"
+    return f"{round(metres * 100, 1) + 0.0:.1f} cm"  # no "-0.0"
 
 
 def _named(row: dict[str, str]) -> dict[str, Any]:

@@ -41,6 +41,15 @@ def test_a_recommendation_with_its_margin_costs_and_map(tmp_path, capsys):
     assert shares["paper, hardware"] > 1 > shares["paper, simulation"]
 
 
+def test_an_interrupt_leaves_no_empty_folder(tmp_path, monkeypatch):
+    def interrupt(*_args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tools.sweep.limit_checks.check_limits", interrupt)
+    assert cli.main(["tune", "--out", str(tmp_path / "out")]) == 130
+    assert not (tmp_path / "out").exists()
+
+
 def test_pressure_at_the_corners_leaves_the_shipped_gains_their_margin(tmp_path, capsys):
     """By hand for the box of 0.7 m: d^2 is 0.35^2 - 0.045^2 along the push and twice 0.35^2 by the ellipsoid."""
     _, result, _ = tune(

@@ -63,3 +63,4 @@ def test_people_read_aligned_rows_with_the_fix_below():
     assert told[1] == "warning  ft.latency-timer       the timer is 16 ms"
     assert told[2] == "                                -> Add a rule"
     assert summary_line(some_checks()) == "1 ok, 1 warning, 1 failed, 1 skipped"
+    assert summary_line(some_checks() * 2) == "2 ok, 2 warnings, 2 failed, 2 skipped"
