@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, ClassVar
 
 import msgspec
@@ -12,7 +11,10 @@ from control import push_law
 from control.laws.law import Seen
 from robot_io.rig.config import ControlConfig
 
-_BACKWARD_RAD = math.pi / 2
+COUNTED_M = 0.25
+"""Of an offset no more than this is added up."""
+TURNED_RAD = (0.2, 0.4)
+"""Up to the first direction of the push all of it is added up, from the second on nothing."""
 
 
 class IntegralSettings(msgspec.Struct, frozen=True):
@@ -50,13 +52,14 @@ class ForceIntegral:
     def step(self, state: IntegralState, seen: Seen) -> tuple[float, IntegralState]:
         """Return theta_p in rad, and the integral after this tick.
 
-        Against windup the integral is bounded, and it does not grow while the direction is at 90 degrees or beyond.
+        Far from the middle the paper's law is on its way back for metres, and an integral of all the offset meanwhile
+        would have to be taken back later: of a large one only a part counts, and of that none while the push is turned.
         """
         proportional = push_law.push_angle(seen.theta_f_rad, seen.lateral_m, self._k_f, self._k_y)
+        straight, turned = TURNED_RAD
+        share = (turned - abs(proportional + state.integral_rad)) / (turned - straight)
+        counted = min(max(seen.lateral_m, -COUNTED_M), COUNTED_M) * min(max(share, 0.0), 1.0)
         k_i = self._k_i * self._fade_m / max(seen.progress_m, self._fade_m)
-        change = k_i * seen.lateral_m * seen.speed_m_per_s * seen.dt_s
-        wanted = proportional + state.integral_rad
-        if abs(wanted) >= _BACKWARD_RAD and change * wanted > 0.0:
-            return wanted, state
+        change = k_i * counted * seen.speed_m_per_s * seen.dt_s
         integral = min(max(state.integral_rad + change, -self._most), self._most)
         return proportional + integral, IntegralState(integral)

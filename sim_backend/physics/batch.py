@@ -13,7 +13,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_io.errors import EnvironmentFault
-from sim_backend.physics.lanes import FADE_M, MAX_INTEGRAL_RAD, Lane, LaneEnd, LaneResult, Timing
+from sim_backend.physics.lanes import (
+    COUNTED_M,
+    FADE_M,
+    MAX_INTEGRAL_RAD,
+    STRAIGHT_RAD,
+    TURNED_RAD,
+    Lane,
+    LaneEnd,
+    LaneResult,
+    Timing,
+)
 
 try:
     from numba import njit
@@ -83,9 +93,12 @@ def _run(lanes: Any, dt: float, steps: int, every: int, states: Any, finals: Any
             elif law == 2.0:
                 theta_p = -k_y * y_c
             else:
-                change = k_i * FADE_M / max(step * way, FADE_M) * y_c * way
+                theta_p = gain_f * atan2(v_y, v_x) + k_y * y_c
+                share = min(max((TURNED_RAD - abs(theta_p + integral)) / (TURNED_RAD - STRAIGHT_RAD), 0.0), 1.0)
+                counted = min(max(y_c, -COUNTED_M), COUNTED_M) * share
+                change = k_i * FADE_M / max(step * way, FADE_M) * counted * way
                 integral = min(max(integral + change, -MAX_INTEGRAL_RAD), MAX_INTEGRAL_RAD)
-                theta_p = gain_f * atan2(v_y, v_x) + k_y * y_c + integral
+                theta_p += integral
             max_theta = max(max_theta, abs(theta_p))
             ratio = cos(theta_p - psi)
             min_ratio = min(min_ratio, ratio)

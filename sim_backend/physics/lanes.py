@@ -21,6 +21,7 @@ from sim_backend.physics.slider_exact import ContactSolver, Moving, solve_exact
 LaneLaw = Literal["force", "open-loop", "line", "force-integral"]
 """The shipped laws, as a rig names them."""
 MAX_INTEGRAL_RAD, FADE_M = 0.5, 6.0
+COUNTED_M, STRAIGHT_RAD, TURNED_RAD = 0.25, 0.2, 0.4
 State = tuple[float, float, float, float, float, float]
 """x, y (m), phi (rad), s (m), fx, fy (N, path frame)."""
 
@@ -58,7 +59,7 @@ class Lane(msgspec.Struct, frozen=True):
     f_max_N: float = 1.0
     law: LaneLaw = "force"
     k_i_rad_per_m2: float = 0.0
-    """Of the law with integral; its other settings are `MAX_INTEGRAL_RAD` and `FADE_M`."""
+    """Of the law with integral; its other settings are the constants above."""
 
 
 class Timing(msgspec.Struct, frozen=True):
@@ -123,7 +124,9 @@ def simulate_lane(
         if lane.law == "force-integral":
             way = lane.speed_m_per_s * timing.dt_s
             gain = lane.k_i_rad_per_m2 * FADE_M / max(step * way, FADE_M)
-            integral = min(max(integral + gain * y_c * way, -MAX_INTEGRAL_RAD), MAX_INTEGRAL_RAD)
+            share = min(max((TURNED_RAD - abs(theta_p + integral)) / (TURNED_RAD - STRAIGHT_RAD), 0.0), 1.0)
+            counted = min(max(y_c, -COUNTED_M), COUNTED_M) * share
+            integral = min(max(integral + gain * counted * way, -MAX_INTEGRAL_RAD), MAX_INTEGRAL_RAD)
             theta_p += integral
         max_theta = max(max_theta, abs(theta_p))
         vx = lane.speed_m_per_s * cos(theta_p - phi)

@@ -60,3 +60,23 @@ def test_a_far_start_does_not_end_sideways(start):
     assert not {"F56", "F56-way"} & set(figures["fault_counts"])
     assert figures["lost_times"] == 0
     assert widest[0] <= math.pi / 2
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("edge", [0.24, -0.16])
+def test_the_integral_leads_no_far_start_out_of_its_room(edge):
+    """With the paper's gains, which are beyond the limit of such a box: it adds up offsets on the way back, too."""
+    ends = {}
+    for law in ("force", "force-integral"):
+        rig = resolve_rig("sim", [
+            f"control.law={law}", "control.distance_m=6", "control.k_f=0.1", "control.k_y_rad_per_m=0.3",
+            "world.start.spread=0", f"world.start.edge_offset_m={edge}", "world.start.lateral_offset_m=0.05",
+            "world.start.heading_deg=3", "world.slider.length_m=0.4", "world.slider.width_m=0.6",
+            "world.slider.mass_kg=4.5", "world.floor.patch_strength=0.2", "world.floor.patch_m=0.3",
+        ])  # fmt: skip
+        figures = Lockstep(rig, 1, _NoLog()).run(lambda *_: None)
+        assert not {"F55-slow", "F55-stop"} & set(figures["fault_counts"])
+        assert figures["exit_code"] == 0
+        ends[law] = abs(figures["lateral_error_m"])
+    assert ends["force-integral"] < ends["force"] + 0.2

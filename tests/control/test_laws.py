@@ -58,36 +58,46 @@ def test_the_integral_adds_k_i_times_the_offset_over_the_way():
 
 def test_it_counts_way_not_time():
     integral = law("force-integral", k_i_rad_per_m2=0.1)
-    _, slow = integral.step(IntegralState(), seen(0.0, 1.0, speed_m_per_s=0.02, dt_s=0.05))
-    _, fast = integral.step(IntegralState(), seen(0.0, 1.0, speed_m_per_s=0.1, dt_s=0.01))
-    _, stands = integral.step(IntegralState(), seen(0.0, 1.0, speed_m_per_s=0.0))
-    assert slow.integral_rad == pytest.approx(fast.integral_rad) == pytest.approx(0.1 * 0.001)
+    _, slow = integral.step(IntegralState(), seen(0.0, 0.2, speed_m_per_s=0.02, dt_s=0.05))
+    _, fast = integral.step(IntegralState(), seen(0.0, 0.2, speed_m_per_s=0.1, dt_s=0.01))
+    _, stands = integral.step(IntegralState(), seen(0.0, 0.2, speed_m_per_s=0.0))
+    assert slow.integral_rad == pytest.approx(fast.integral_rad) == pytest.approx(0.1 * 0.2 * 0.001)
     assert stands.integral_rad == 0.0
 
 
 @pytest.mark.parametrize(("progress", "share"), [(0.0, 1.0), (5.9, 1.0), (12.0, 0.5), (24.0, 0.25)])
 def test_its_gain_fades_beyond_six_metres(progress, share):
-    _, state = law("force-integral").step(IntegralState(), seen(0.0, 1.0, progress_m=progress))
-    assert state.integral_rad == pytest.approx(0.06 * 0.001 * share)
+    _, state = law("force-integral").step(IntegralState(), seen(0.0, 0.2, progress_m=progress))
+    assert state.integral_rad == pytest.approx(0.06 * 0.2 * 0.001 * share)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_the_integral_is_bounded_on_both_sides(side):
     integral = law("force-integral", k_i_rad_per_m2=5.0, max_integral_rad=0.4)
     state = IntegralState()
-    for _ in range(2000):
-        theta_p, state = integral.step(state, seen(0.0, side))
+    for _ in range(2000):  # an error of the force's angle of 0.27 rad, to the other side than the offset
+        theta_p, state = integral.step(state, seen(-side * 0.27, side * 0.25))
     assert state.integral_rad == side * 0.4
-    assert theta_p == pytest.approx(side * (0.2 + 0.4))
+    assert theta_p == pytest.approx(side * (-1.3 * 0.27 + 0.2 * 0.25 + 0.4))
+
+
+@pytest.mark.parametrize(("lateral", "counted"), [(0.24, 0.24), (0.26, 0.25), (-0.24, -0.24), (-1.0, -0.25)])
+def test_of_an_offset_only_a_quarter_of_a_metre_counts(lateral, counted):
+    against = -0.2 * lateral / 1.3  # the push is straight all the same
+    _, state = law("force-integral").step(IntegralState(), seen(against, lateral))
+    assert state.integral_rad == pytest.approx(0.06 * counted * 0.001)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_it_does_not_wind_up_at_ninety_degrees_but_unwinds(side):
-    integral = law("force-integral")
-    beyond = seen(side * 1.3, side * 0.5)  # 1.3 * 1.3 + 0.1 > pi / 2
-    assert integral.step(IntegralState(side * 0.2), beyond)[1] == IntegralState(side * 0.2)
-    back = seen(side * 1.5, -side * 0.5)
-    assert abs(integral.step(IntegralState(side * 0.2), back)[1].integral_rad) < 0.2
+@pytest.mark.parametrize(
+    ("direction", "share"), [(0.19, 1.0), (0.25, 0.75), (0.3, 0.5), (0.39, 0.05), (0.41, 0.0), (2.0, 0.0)]
+)
+def test_while_the_push_is_turned_less_is_added_up_or_nothing(side, direction, share):
+    """Also what was added up turns the push: 0.1 rad here."""
+    force = (side * direction - side * 0.1 - 0.2 * 0.2) / 1.3
+    theta_p, state = law("force-integral").step(IntegralState(side * 0.1), seen(force, 0.2))
+    assert theta_p == pytest.approx(side * direction, abs=2e-5)
+    assert state.integral_rad - side * 0.1 == pytest.approx(0.06 * 0.2 * 0.001 * share)
 
 
 def test_its_settings_are_checked():

@@ -6,6 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from control.laws.force_integral import ForceIntegral, IntegralSettings
+from control.laws.law import Seen
+from robot_io.rig.config import ControlConfig
 from sim_backend.physics.batch import run_batch
 from sim_backend.physics.lanes import Lane, LaneEnd, Timing, simulate_lane
 from sim_backend.physics.slider_qp import QpSolver
@@ -58,6 +61,25 @@ def test_batch_equals_the_plain_lane():
     for result, kept in zip(results, states, strict=True):
         assert np.isnan(kept[result.steps // 100 + 1 :]).all()
         assert not np.isnan(kept[: result.steps // 100 + 1]).any()
+
+
+def test_the_law_with_integral_of_a_lane_is_the_one_that_pushes():
+    """From 0.5 m beside the path its offset is cut, and the push turned by more than is added up."""
+    lane = Lane(False, 0.5, 0.5, 0.38, 0.5, 0.2, -0.3, 0.2, k_f=0.3, k_y_rad_per_m=0.3, law="force-integral",
+                k_i_rad_per_m2=0.5)  # fmt: skip
+    law = ForceIntegral(ControlConfig(k_f=0.3, k_y_rad_per_m=0.3), IntegralSettings(k_i_rad_per_m2=0.5))
+    for steps in (1, 40, 400, 1500, 8000):
+        result, records = simulate_lane(lane, Timing(steps=steps, record_every=1))
+        state, widest, thetas = law.initial(), 0.0, []
+        for step, (_, y, phi, s, fx, fy) in enumerate(records[: result.steps]):
+            y_c = y - math.sin(phi) * 0.5 + math.cos(phi) * s
+            seen = Seen(fx, fy, True, math.atan2(fy, fx), y_c, step * 0.001, 0.1, 0.01)
+            theta_p, state = law.step(state, seen)
+            thetas.append(abs(theta_p))
+            widest = max(widest, thetas[-1])
+        assert result.max_abs_theta_p_rad == pytest.approx(widest, abs=1e-12)
+    assert max(thetas) > 0.4
+    assert min(thetas) < 0.2
 
 
 @pytest.mark.parametrize(
