@@ -73,7 +73,7 @@ class KnownForms:
     MOST = 1000
     """More lengths than a run's messages have; beyond it those kept are made anew."""
     MOST_OF_A_LENGTH = 4
-    """What has more forms than these is read part by part: making one costs as much as ten such readings."""
+    """What has more forms than these is read part by part: making one takes longer than such a reading."""
 
     def __init__(self) -> None:
         self._forms: dict[tuple[int, int], list[KnownForm | None]] = {}
