@@ -12,7 +12,7 @@ from control.laws.law import Seen
 from robot_io.rig.config import ControlConfig
 
 COUNTED_M = 0.25
-"""Of an offset no more than this is added up."""
+"""Of an offset no more than this is added up; both constants were chosen by study (docs/laws.md)."""
 TURNED_RAD = (0.2, 0.4)
 """Up to the first direction of the push all of it is added up, from the second on nothing."""
 
@@ -35,7 +35,10 @@ class IntegralState(msgspec.Struct, frozen=True):
 
 
 class ForceIntegral:
-    """theta_p = (k_f + 1) theta_f + k_y y_c + I, where dI/ds = k_i y_c over the way s, and k_i fades with it."""
+    """theta_p = (k_f + 1) theta_f + k_y y_c + I, PATH frame; dI/ds = k_i y_c over the way s, and k_i fades with it.
+
+    Of an offset y_c far from the path, and while the push is turned, only a part counts (`step`).
+    """
 
     name: ClassVar[str] = "force with integral"
     Settings: ClassVar = IntegralSettings
